@@ -1,0 +1,12 @@
+# Warnings, sanitizers: one interface target that every one of our targets links privately.
+add_library(swarmfit_compile_options INTERFACE)
+target_compile_options(swarmfit_compile_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+  $<$<BOOL:${SWARMFIT_WARNINGS_AS_ERRORS}>:-Werror>
+  # A cost must not depend on what the optimiser felt like contracting.
+  -ffp-contract=off)
+if(SWARMFIT_SANITIZE)
+  target_compile_options(swarmfit_compile_options INTERFACE
+    -fsanitize=${SWARMFIT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(swarmfit_compile_options INTERFACE -fsanitize=${SWARMFIT_SANITIZE})
+endif()

@@ -1,0 +1,108 @@
+// Find all models of a kind in data full of outliers.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <swarmfit/backend.hpp>
+#include <swarmfit/error.hpp>
+#include <swarmfit/export.hpp>
+#include <swarmfit/model.hpp>
+#include <swarmfit/points.hpp>
+
+namespace swarmfit {
+
+enum class Preset {
+  fast,   ///< what measures best
+  paper,  ///< Zhou et al. 2010 to the letter
+};
+enum class Deflation {
+  residual,    ///< each point's cap sinks with what has been explained of it
+  parametric,  ///< Eq. (5): fitness lessened around the parameters of found models
+};
+enum class Loss { truncated_l1, truncated_l2 };
+
+/// Only planes whose normal is within `max_angle` of `axis` (n and -n are one plane), or lines whose normal is.
+struct DirectionPrior {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< need not be a unit vector; not zero
+  double max_angle = 0.2;                           ///< [rad], in (0, pi/2]
+};
+
+struct FitOptions {
+  ModelType model = ModelType::plane;
+  std::optional<double> threshold;     ///< tau [data unit], > 0; none: the kind's default (plane 0.01), estimated where that is `auto`
+  bool estimate_threshold = false;     ///< tau from the data's own noise, whatever `threshold` says
+  Preset preset = Preset::fast;        ///< decides every option below that is left empty
+  std::optional<int> particles;        ///< M, >= 2
+  std::optional<int> iterations;       ///< most steps of one swarm, >= 1
+  std::optional<int> stall;            ///< s: converged when the global best has not moved for s steps, >= 1
+  std::optional<Deflation> deflation;
+  std::optional<double> lambda;        ///< Eq. (5), > 0
+  std::optional<Loss> loss;
+  std::size_t min_inliers = 0;         ///< 0: decided from the data
+  std::size_t max_models = 0;          ///< 0: no bound
+  double time_budget_ms = 0;           ///< 0: none; what is found by then is valid
+  std::optional<DirectionPrior> prior;
+  std::uint64_t seed = 1;
+  std::string backend = "auto";        ///< auto, cpu, vulkan, reference, or part of a device's name
+  int threads = 0;                     ///< of the CPU back end; 0 takes all
+  std::string pipeline_cache;          ///< folder for compiled Vulkan pipelines; empty keeps none
+
+  /// Fails with invalid_option, naming the field, its value and its bound.
+  SWARMFIT_API Expected<> validate() const;
+};
+
+/// Told of each model the moment it is found; `stop` ends the fit with what there is.
+enum class Verdict { go_on, stop };
+using ModelCallback = std::function<Verdict(const Model&)>;
+
+struct FitResult {
+  std::vector<Model> models;
+  std::vector<std::uint16_t> labels;  ///< one a point, in input order: 0 none, k the k-th model
+  BackendInfo backend;
+  std::uint64_t seed = 0;
+  double threshold = 0;               ///< tau used [data unit]
+  std::string stop_reason = "not called";
+  std::size_t finite_points = 0;
+  std::size_t iterations = 0;
+  std::size_t evaluations = 0;
+  double points_touched = 1;
+  double total_ms = 0;
+
+  /// One line a person can read.
+  SWARMFIT_API std::string brief() const;
+};
+
+/// Holds a back end; reuse it over frames. Not thread-safe; one a thread.
+class SWARMFIT_API Fitter {
+ public:
+  /// Fails with invalid_option or backend_unavailable.
+  static Expected<Fitter> create(const FitOptions& options);
+  ~Fitter();
+  Fitter(Fitter&&) noexcept;
+  Fitter& operator=(Fitter&&) noexcept;
+
+  /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension).
+  Expected<FitResult> fit(const PointsView& points, const ModelCallback& on_model = {}, std::stop_token stop = {},
+                          const std::vector<Model>& warm_start = {});
+
+  const FitOptions& options() const noexcept;
+  BackendInfo backend() const;
+
+ private:
+  struct State;
+  explicit Fitter(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// One call for one cloud.
+SWARMFIT_API Expected<FitResult> fit(const PointsView& points, const FitOptions& options = {}, const ModelCallback& on_model = {});
+
+}  // namespace swarmfit

@@ -1,0 +1,52 @@
+// A fitted model.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <swarmfit/error.hpp>
+#include <swarmfit/export.hpp>
+
+namespace swarmfit {
+
+enum class ModelType {
+  line2d,  ///< points (x, y); parameters a, b, offset: a x + b y + offset = 0, a^2 + b^2 = 1
+  plane,   ///< points (x, y, z); parameters nx, ny, nz, offset: n . x + offset = 0, |n| = 1
+};
+
+/// The name used on the command line and in result.json.
+SWARMFIT_API std::string_view name(ModelType type) noexcept;
+/// Fails with invalid_option, naming what there is.
+SWARMFIT_API Expected<ModelType> model_type(std::string_view name);
+/// Every kind this build knows.
+SWARMFIT_API std::span<const ModelType> model_types() noexcept;
+/// Columns of a point the kind is fitted to.
+SWARMFIT_API int dimension(ModelType type) noexcept;
+
+struct Model {
+  ModelType type = ModelType::plane;
+  Eigen::VectorXd parameters;       ///< as listed at ModelType, in the data's frame and unit
+  std::size_t inliers = 0;          ///< points labelled with this model
+  double cost = 0;                  ///< truncated loss over all points under the caps it was found with [data unit]
+  double rms = 0;                   ///< of its inliers' distances [data unit]
+  Eigen::MatrixXd covariance;       ///< of `parameters`, parameter_count x parameter_count, from the inliers' residuals
+  bool supporting = false;          ///< set by perception: horizontal, and of reasonable size
+  std::size_t iterations = 0;       ///< swarm steps spent on it
+  std::size_t evaluations = 0;      ///< particles scored for it
+  double points_touched = 1;        ///< share of points x particles really computed, in [0, 1]
+  double found_at_ms = 0;           ///< since the start of the fit
+
+  /// plane: the unit normal; line2d: the unit normal with z = 0.
+  Eigen::Vector3d normal() const {
+    return type == ModelType::plane ? Eigen::Vector3d(parameters.head<3>()) : Eigen::Vector3d(parameters[0], parameters[1], 0);
+  }
+  /// plane, line2d: offset in normal . x + offset = 0.
+  double offset() const { return parameters[parameters.size() - 1]; }
+};
+
+}  // namespace swarmfit

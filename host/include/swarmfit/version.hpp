@@ -1,0 +1,5 @@
+#pragma once
+
+#define SWARMFIT_VERSION_MAJOR 0
+#define SWARMFIT_VERSION_MINOR 1
+#define SWARMFIT_VERSION_PATCH 0

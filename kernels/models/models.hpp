@@ -1,0 +1,34 @@
+// The kinds of model that kernels can evaluate.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+namespace swarmfit::kernels {
+
+/// The values are shared with shaders/layout.h.
+enum class ModelKind : std::uint32_t { line2d = 0, plane = 1 };
+
+inline constexpr ModelKind kModelKinds[] = {ModelKind::line2d, ModelKind::plane};
+
+/// The most parameters and coefficients any kind has, and columns any point has.
+inline constexpr int kMaxParameters = 12;
+inline constexpr int kMaxDimension = 4;
+
+struct ModelTraits {
+  std::string_view name;
+  int dimension = 0;          ///< columns of a point
+  int parameter_count = 0;    ///< doubles in the data's frame, as results give them
+  int coefficient_count = 0;  ///< scalars in the centred frame, as kernels read them
+};
+
+const ModelTraits& traits(ModelKind kind) noexcept;
+std::optional<ModelKind> model_kind(std::string_view name) noexcept;
+
+/// Parameters in the data's frame to a kernel's coefficients in the frame centred at `centre`.
+/// parameters: parameter_count, centre: dimension, coefficients: coefficient_count. Returns false if a coefficient is not finite.
+bool centred_coefficients(ModelKind kind, const double* parameters, const double* centre, double* coefficients) noexcept;
+
+}  // namespace swarmfit::kernels
