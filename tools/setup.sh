@@ -1,0 +1,62 @@
+#!/bin/bash
+# Installs every system package that building, testing and running Swarmfit needs on Debian 12. Says what it does; done in a moment
+# where all is there. Needs root, or sudo.
+set -euo pipefail
+
+packages=(
+  # build
+  g++ cmake ninja-build ccache
+  # Vulkan: headers and loader, a software device (lavapipe), validation, GLSL to SPIR-V
+  libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools spirv-tools
+  # libraries
+  libhwy-dev libtbb-dev libeigen3-dev librandom123-dev libexpected-dev libcli11-dev nlohmann-json3-dev libfmt-dev liblzf-dev
+  libopencv-dev
+  # tests and benchmarks
+  libgtest-dev libbenchmark-dev
+  # the Motorcycle stereo pair
+  python3-skimage
+)
+lint_packages=(clang-format clang-tidy)
+
+usage() {
+  echo "usage: tools/setup.sh [--lint]"
+  echo "  --lint  also the packages of tools/lint.sh: ${lint_packages[*]}"
+}
+
+for argument in "$@"; do
+  case "$argument" in
+    --lint) packages+=("${lint_packages[@]}") ;;
+    -h|--help) usage; exit 0 ;;
+    *) usage >&2; exit 2 ;;
+  esac
+done
+
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  echo "setup: no apt-get here; install the equivalents of: ${packages[*]}" >&2
+  exit 1
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [ "$status" = installed ] || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then
+  echo "setup: all ${#packages[@]} packages are installed"
+  exit 0
+fi
+
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "setup: run as root, or install sudo; missing: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+
+echo "setup: installing ${#missing[@]} packages: ${missing[*]}"
+"${as_root[@]}" apt-get update -qq
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+  apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "${missing[@]}" </dev/null |
+  awk '/^Setting up / { ++done } END { printf "setup: %d packages set up, dependencies counted\n", done }'
