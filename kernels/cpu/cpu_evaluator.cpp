@@ -1,0 +1,240 @@
+// The CPU back end: fixed tiles of points under TBB, Highway vectors inside (cpu_kernels.hpp). Every sum is taken in an order that
+// neither the number of threads nor the other models of a swarm have a part in.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <oneapi/tbb/info.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include "kernels/checks.hpp"
+#include "kernels/cpu/cpu_kernels.hpp"
+#include "kernels/cpu/point_store.hpp"
+#include "kernels/evaluators.hpp"
+
+namespace swarmfit::kernels {
+namespace {
+
+using namespace cpu;
+
+constexpr int kMaxThreads = 1024;
+/// Runs of tiles whose costs are summed first; few, so that partial sums stay small whatever the size of the cloud.
+constexpr std::size_t kMaxRuns = 128;
+
+std::vector<std::string> kernel_names() {
+  std::vector<std::string> names;
+  for (const CpuKernels* kernels : available_kernels()) names.emplace_back(kernels->name);
+  return names;
+}
+
+bool same_ignoring_case(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
+    return std::tolower(static_cast<unsigned char>(x)) == std::tolower(static_cast<unsigned char>(y));
+  });
+}
+
+std::string device_name(const CpuKernels& kernels, int threads) {
+  return fmt::format("{}, {} thread{}", kernels.name, threads, threads == 1 ? "" : "s");
+}
+
+/// Work that may run out of memory, with the failure as a value.
+template <class Work>
+Result<> guarded(std::size_t points, Work&& work) {
+  try {
+    work();
+    return {};
+  } catch (const std::bad_alloc&) {
+    return fail(Failure::Kind::out_of_memory, fmt::format("host memory does not hold {} points", points));
+  }
+}
+
+class CpuEvaluator final : public FitnessEvaluator {
+ public:
+  CpuEvaluator(const CpuKernels& kernels, int threads)
+      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels, threads)} {}
+
+  const Identity& identity() const noexcept override { return identity_; }
+  Support supports(const Workload& workload) const override {
+    const std::size_t most = std::numeric_limits<std::int32_t>::max();
+    if (workload.points <= most) return {};
+    return {false, fmt::format("points is {}, must be <= {}", workload.points, most)};
+  }
+
+  Result<> set_points(const PointsView& points) override {
+    effort_ = {};
+    if (auto ok = check_points(points); !ok) return ok;
+    return guarded(points.count, [&] { arena_.execute([&] { store_.assign(points); }); });
+  }
+
+  Result<> set_caps(std::span<const float> caps) override {
+    if (auto ok = check_size("caps.size()", caps.size(), store_.count()); !ok) return ok;
+    for (std::size_t i = 0; i < store_.finite(); ++i) {
+      const std::size_t row = store_.input_index(i);
+      if (!(caps[row] >= 0 && caps[row] <= std::numeric_limits<float>::max())) {
+        return fail(Failure::Kind::invalid, fmt::format("caps[{}] is {}, must be finite and >= 0", row, caps[row]));
+      }
+    }
+    arena_.execute([&] { store_.set_caps(caps); });
+    return {};
+  }
+
+  Result<> evaluate(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs) override {
+    if (auto ok = check_swarm(swarm, store_.dimension(), cutoffs, costs); !ok) return ok;
+    return guarded(store_.count(), [&] {
+      centre(swarm);
+      arena_.execute([&] { sum_costs(swarm, loss); });
+      gather(swarm.count, costs);
+      effort_.evaluations += swarm.count;
+      effort_.point_models += swarm.count * store_.finite();
+      effort_.touched += swarm.count * store_.finite();
+    });
+  }
+
+  Result<> distances(const ModelView& model, std::span<float> distances) override {
+    if (auto ok = check_model(model, store_.dimension()); !ok) return ok;
+    if (auto ok = check_size("distances.size()", distances.size(), store_.count()); !ok) return ok;
+    std::array<float, kMaxParameters> k{};
+    const bool finite = centre(model, k.data());
+    std::fill(distances.begin(), distances.end(), std::numeric_limits<float>::quiet_NaN());
+    arena_.execute([&] {
+      tbb::parallel_for(std::size_t{0}, store_.tiles(), [&](std::size_t tile) {
+        alignas(64) std::array<float, kTilePoints> near;
+        if (finite) {
+          kernels_.distances(model.kind, store_.tile(tile), k.data(), near.data());
+        } else {
+          near.fill(std::numeric_limits<float>::infinity());
+        }
+        const std::size_t first = tile * kTilePoints;
+        const std::size_t count = std::min(kTilePoints, store_.finite() - first);
+        for (std::size_t i = 0; i < count; ++i) distances[store_.input_index(first + i)] = near[i];
+      });
+    });
+    return {};
+  }
+
+  Result<> assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) override {
+    if (auto ok = check_assign(models, store_.dimension(), store_.count(), tolerance, labels); !ok) return ok;
+    return guarded(store_.count(), [&] {
+      std::vector<std::array<float, kMaxParameters>> coefficients(models.size());
+      std::vector<char> usable(models.size());
+      for (std::size_t m = 0; m < models.size(); ++m) usable[m] = centre(models[m], coefficients[m].data());
+      std::fill(labels.begin(), labels.end(), std::uint16_t{0});
+      arena_.execute([&] {
+        tbb::parallel_for(std::size_t{0}, store_.tiles(), [&](std::size_t tile) {
+          assign_tile(tile, models, coefficients, usable, tolerance, labels);
+        });
+      });
+    });
+  }
+
+  Effort effort() const noexcept override { return effort_; }
+
+ private:
+  /// Coefficients in the frame of the stored points; false if one is not finite.
+  bool centre(const ModelView& model, float* k) const {
+    std::array<double, kMaxParameters> wide{};
+    const bool finite = centred_coefficients(model.kind, model.parameters.data(), store_.centre(), wide.data());
+    // What float cannot hold is farther away than any point either way.
+    constexpr double most = 1e30;
+    for (std::size_t c = 0; c < wide.size(); ++c) k[c] = static_cast<float>(std::clamp(wide[c], -most, most));
+    return finite;
+  }
+
+  void centre(const SwarmView& swarm) {
+    const auto rows = static_cast<std::size_t>(traits(swarm.kind).parameter_count);
+    const auto width = static_cast<std::size_t>(traits(swarm.kind).coefficient_count);
+    coefficients_.resize(swarm.count * width);
+    finite_.resize(swarm.count);
+    for (std::size_t j = 0; j < swarm.count; ++j) {
+      std::array<float, kMaxParameters> k{};
+      finite_[j] = centre(ModelView{swarm.kind, swarm.parameters.subspan(j * rows, rows)}, k.data());
+      for (std::size_t c = 0; c < width; ++c) coefficients_[j * width + c] = finite_[j] ? k[c] : 0.0F;
+    }
+  }
+
+  /// Tiles in runs, models in groups: each pair is a task, and writes its own partial sums.
+  void sum_costs(const SwarmView& swarm, Loss loss) {
+    const auto width = static_cast<std::size_t>(traits(swarm.kind).coefficient_count);
+    const std::size_t tiles_a_run = (store_.tiles() + kMaxRuns - 1) / kMaxRuns;
+    runs_ = tiles_a_run == 0 ? 0 : (store_.tiles() + tiles_a_run - 1) / tiles_a_run;
+    const std::size_t groups = (swarm.count + kGroupModels - 1) / kGroupModels;
+    partial_.assign(runs_ * swarm.count, 0.0);
+    tbb::parallel_for(std::size_t{0}, runs_ * groups, [&](std::size_t task) {
+      const std::size_t run = task / groups;
+      const std::size_t first_model = task % groups * kGroupModels;
+      const std::size_t models = std::min(kGroupModels, swarm.count - first_model);
+      const std::size_t last_tile = std::min(store_.tiles(), (run + 1) * tiles_a_run);
+      for (std::size_t tile = run * tiles_a_run; tile < last_tile; ++tile) {
+        kernels_.add_costs(swarm.kind, loss, store_.tile(tile), coefficients_.data() + first_model * width, models,
+                           partial_.data() + run * swarm.count + first_model);
+      }
+    });
+  }
+
+  void gather(std::size_t models, std::span<float> costs) const {
+    for (std::size_t j = 0; j < models; ++j) {
+      double total = 0;
+      for (std::size_t run = 0; run < runs_; ++run) total += partial_[run * models + j];
+      costs[j] = finite_[j] ? static_cast<float>(total) : std::numeric_limits<float>::infinity();
+    }
+  }
+
+  void assign_tile(std::size_t tile, std::span<const ModelView> models, const std::vector<std::array<float, kMaxParameters>>& coefficients,
+                   const std::vector<char>& usable, std::span<const float> tolerance, std::span<std::uint16_t> labels) const {
+    alignas(64) std::array<float, kTilePoints> near, nearest, allowed;
+    std::array<std::uint16_t, kTilePoints> label;
+    const std::size_t first = tile * kTilePoints;
+    const std::size_t count = std::min(kTilePoints, store_.finite() - first);
+    nearest.fill(std::numeric_limits<float>::infinity());
+    label.fill(0);
+    for (std::size_t i = 0; i < count; ++i) allowed[i] = tolerance[tolerance.size() == 1 ? 0 : store_.input_index(first + i)];
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      if (!usable[m]) continue;
+      kernels_.distances(models[m].kind, store_.tile(tile), coefficients[m].data(), near.data());
+      kernels_.keep_nearest(near.data(), allowed.data(), count, static_cast<std::uint16_t>(m + 1), nearest.data(), label.data());
+    }
+    for (std::size_t i = 0; i < count; ++i) labels[store_.input_index(first + i)] = label[i];
+  }
+
+  const CpuKernels& kernels_;
+  tbb::task_arena arena_;
+  Identity identity_;
+  PointStore store_;
+  std::vector<float> coefficients_;
+  std::vector<char> finite_;      ///< a model: whether its coefficients are finite
+  std::vector<double> partial_;   ///< a run of tiles and a model: the cost
+  std::size_t runs_ = 0;
+  Effort effort_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOptions& options) {
+  if (options.threads < 0 || options.threads > kMaxThreads) {
+    return fail(Failure::Kind::invalid, fmt::format("threads is {}, must be in [0, {}]", options.threads, kMaxThreads));
+  }
+  const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  for (const CpuKernels* kernels : available_kernels()) {
+    if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name)) return std::make_unique<CpuEvaluator>(*kernels, threads);
+  }
+  return fail(Failure::Kind::unavailable,
+              fmt::format("simd is '{}', must be one of what this processor has: {}", options.simd, fmt::join(kernel_names(), ", ")));
+}
+
+std::vector<DeviceDescription> cpu_devices() {
+  const int threads = tbb::info::default_concurrency();
+  DeviceDescription device{"cpu", device_name(*available_kernels().front(), threads), "cpu", true, "always there", {}};
+  device.limits.emplace_back("instruction sets", fmt::format("{}", fmt::join(kernel_names(), ", ")));
+  device.limits.emplace_back("threads", fmt::format("{}", threads));
+  device.limits.emplace_back("points", fmt::format("{}", std::numeric_limits<std::int32_t>::max()));
+  return {device};
+}
+
+}  // namespace swarmfit::kernels
