@@ -55,8 +55,17 @@ if [ "$(id -u)" -ne 0 ]; then
   as_root=(sudo)
 fi
 
-echo "setup: installing ${#missing[@]} packages: ${missing[*]}"
-"${as_root[@]}" apt-get update -qq
-"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-  apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "${missing[@]}" </dev/null |
-  awk '/^Setting up / { ++done } END { printf "setup: %d packages set up, dependencies counted\n", done }'
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+run_as_root() {
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive "$@" </dev/null >"$log" 2>&1 || {
+    cat "$log" >&2
+    echo "setup: failed: $*" >&2
+    exit 1
+  }
+}
+
+echo "setup: installing ${#missing[@]} packages and what they depend on: ${missing[*]}"
+run_as_root apt-get update
+run_as_root apt-get install -y --no-install-recommends -o Dpkg::Use-Pty=0 "${missing[@]}"
+echo "setup: $(grep -c '^Setting up ' "$log" || true) packages set up in $SECONDS s"
