@@ -1,0 +1,193 @@
+// What line2d and plane share: a unit normal in D dimensions and an offset, normal . x + offset = 0.
+#pragma once
+
+#include <cmath>
+#include <optional>
+
+#include <Eigen/Dense>
+
+#include "host/models/model_space.hpp"
+
+namespace swarmfit::models {
+
+template <int D>
+class Hyperplane : public ModelSpace {
+ public:
+  using Vector = Eigen::Matrix<double, D, 1>;
+
+  explicit Hyperplane(const std::optional<DirectionPrior>& prior) {
+    if (!prior) return;
+    axis_ = prior->axis.template head<D>().normalized();
+    max_angle_ = prior->max_angle;
+  }
+
+  int minimal_sample() const noexcept override { return D; }
+  int parameter_count() const noexcept override { return D + 1; }
+  int freedom() const noexcept override { return D; }
+
+  bool from_sample(const WorkingPoints& points, std::span<const std::uint32_t> sample, Position& theta) const override {
+    const Vector origin = points.template point<D>(sample[0]);
+    Vector normal;
+    if constexpr (D == 2) {
+      const Vector along = points.template point<2>(sample[1]) - origin;
+      normal = Vector(-along.y(), along.x());
+    } else {
+      const Vector a = points.template point<3>(sample[1]) - origin;
+      const Vector b = points.template point<3>(sample[2]) - origin;
+      normal = a.cross(b);
+      // The sine of the angle between the sides: below this the sample is a line for all that float coordinates can tell.
+      if (normal.squaredNorm() <= 1e-8 * a.squaredNorm() * b.squaredNorm()) return false;
+    }
+    const double length = normal.norm();
+    if (!(length > 1e-14) || !std::isfinite(length)) return false;
+    theta.resize(D + 1);
+    theta.template head<D>() = normal / length;
+    theta[D] = -theta.template head<D>().dot(origin);
+    return admit(theta);
+  }
+
+  void difference(const Position& from, const Position& to, Eigen::Ref<Eigen::VectorXd> velocity) const override {
+    const Vector n = from.template head<D>();
+    Vector m = to.template head<D>();
+    double offset = to[D];
+    if (n.dot(m) < 0) {  // n and -n are one plane
+      m = -m;
+      offset = -offset;
+    }
+    const Vector across = m - n.dot(m) * n;
+    const double sine = across.norm();
+    const double angle = std::atan2(sine, n.dot(m));
+    velocity.template head<D>() = sine > 1e-300 ? Vector(across * (angle / sine)) : Vector(Vector::Zero());
+    velocity[D] = offset - from[D];
+  }
+
+  void move(Position& theta, Eigen::Ref<Eigen::VectorXd> velocity) const override {
+    const Vector n = theta.template head<D>();
+    Vector v = velocity.template head<D>();
+    v -= n.dot(v) * n;  // random factors per dimension leave the tangent space; this brings it back
+    double angle = v.norm();
+    constexpr double kQuarterTurn = 1.5707963267948966;
+    if (angle > kQuarterTurn) {
+      v *= kQuarterTurn / angle;
+      angle = kQuarterTurn;
+    }
+    if (angle > 1e-300) {
+      const Vector direction = v / angle;
+      theta.template head<D>() = (std::cos(angle) * n + std::sin(angle) * direction).normalized();
+      // Parallel transport along the geodesic: the velocity keeps its length and its angle to the way.
+      velocity.template head<D>() = angle * (std::cos(angle) * direction - std::sin(angle) * n);
+    } else {
+      velocity.template head<D>().setZero();
+    }
+    theta[D] += velocity[D];
+  }
+
+  double distance(const Position& a, const Position& b) const override {
+    Eigen::VectorXd v(D + 1);
+    difference(a, b, v);
+    return v.norm();
+  }
+
+  bool refine(const WorkingPoints& points, const Weighted& support, Position& theta) const override {
+    Vector mean;
+    Eigen::Matrix<double, D, D> scatter;
+    if (!moments(points, support, mean, scatter)) return false;
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> solver(scatter);
+    if (solver.info() != Eigen::Success) return false;
+    // The second smallest spread tells a plane from a line of points, a line from a single point.
+    if (!(solver.eigenvalues()[1] > 1e-12)) return false;
+    Vector normal = solver.eigenvectors().col(0);
+    if (normal.dot(theta.template head<D>()) < 0) normal = -normal;
+    theta.template head<D>() = normal;
+    theta[D] = -normal.dot(mean);
+    return admit(theta);
+  }
+
+  Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(D + 1, D + 1);
+    Vector mean;
+    Eigen::Matrix<double, D, D> scatter;
+    if (!moments(points, support, mean, scatter)) return covariance;
+    double total = 0;
+    for (const double w : support.weight) total += w;
+    // Residual n.x + o. With n moving in its tangent space T, the Jacobian row is [x^T T, 1]; its information is the scatter about the
+    // mean for the direction and the total weight for the offset at the mean.
+    const Vector n = theta.template head<D>();
+    const Eigen::Matrix<double, D, D> project = Eigen::Matrix<double, D, D>::Identity() - n * n.transpose();
+    const Eigen::Matrix<double, D, D> information = project * scatter * project * total;
+    const Eigen::Matrix<double, D, D> direction = information.completeOrthogonalDecomposition().pseudoInverse();
+    covariance.topLeftCorner(D, D) = direction;
+    covariance.block(0, D, D, 1) = -direction * mean;
+    covariance.block(D, 0, 1, D) = covariance.block(0, D, D, 1).transpose();
+    covariance(D, D) = mean.dot(direction * mean) + 1.0 / total;
+    return covariance;
+  }
+
+  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
+    Eigen::VectorXd parameters = theta;
+    parameters[D] = theta[D] * frame.scale;
+    for (int d = 0; d < D; ++d) parameters[D] -= theta[d] * frame.centre[static_cast<std::size_t>(d)];
+    return parameters;
+  }
+
+  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+    Position theta = parameters;
+    for (int d = 0; d < D; ++d) theta[D] += parameters[d] * frame.centre[static_cast<std::size_t>(d)];
+    theta[D] /= frame.scale;
+    return theta;
+  }
+
+  Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position&, const Frame& frame) const override {
+    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Identity(D + 1, D + 1);
+    jacobian(D, D) = frame.scale;
+    for (int d = 0; d < D; ++d) jacobian(D, d) = -frame.centre[static_cast<std::size_t>(d)];
+    return jacobian * covariance * jacobian.transpose();
+  }
+
+  bool admit(Position& theta) const override {
+    if (!theta.allFinite()) return false;
+    if (!max_angle_) return true;
+    Vector n = theta.template head<D>();
+    double cosine = n.dot(axis_);
+    if (cosine < 0) {
+      theta = -theta;
+      n = -n;
+      cosine = -cosine;
+    }
+    if (cosine >= std::cos(*max_angle_)) return true;
+    // Back to the rim of the cone, keeping the plane through its foot point nearest to the centre of the data.
+    const Vector foot = -theta[D] * n;
+    Vector across = n - cosine * axis_;
+    const double length = across.norm();
+    if (!(length > 1e-12)) return false;
+    theta.template head<D>() = (std::cos(*max_angle_) * axis_ + std::sin(*max_angle_) * across / length).normalized();
+    theta[D] = -theta.template head<D>().dot(foot);
+    return true;
+  }
+
+ private:
+  /// Weighted mean and scatter (divided by the total weight) about it.
+  static bool moments(const WorkingPoints& points, const Weighted& support, Vector& mean, Eigen::Matrix<double, D, D>& scatter) {
+    if (support.index.size() < static_cast<std::size_t>(D)) return false;
+    double total = 0;
+    mean.setZero();
+    for (std::size_t k = 0; k < support.index.size(); ++k) {
+      total += support.weight[k];
+      mean += support.weight[k] * points.template point<D>(support.index[k]);
+    }
+    if (!(total > 0)) return false;
+    mean /= total;
+    scatter.setZero();
+    for (std::size_t k = 0; k < support.index.size(); ++k) {
+      const Vector x = points.template point<D>(support.index[k]) - mean;
+      scatter.noalias() += support.weight[k] * x * x.transpose();
+    }
+    scatter /= total;
+    return true;
+  }
+
+  Vector axis_ = Vector::Zero();
+  std::optional<double> max_angle_;
+};
+
+}  // namespace swarmfit::models

@@ -1,0 +1,60 @@
+// The table of kinds: a new model is a row here and a file beside this one.
+#include "host/models/model_space.hpp"
+
+#include <array>
+#include <string>
+
+#include <fmt/format.h>
+
+namespace swarmfit {
+namespace models {
+namespace {
+
+struct Kind {
+  ModelType type;
+  kernels::ModelKind kernel;
+  std::unique_ptr<ModelSpace> (*make)(const std::optional<DirectionPrior>&);
+};
+
+constexpr std::array kKinds{
+    Kind{ModelType::line2d, kernels::ModelKind::line2d, make_line2d_space},
+    Kind{ModelType::plane, kernels::ModelKind::plane, make_plane_space},
+};
+
+const Kind& row(ModelType type) noexcept {
+  for (const Kind& kind : kKinds) {
+    if (kind.type == type) return kind;
+  }
+  return kKinds.back();
+}
+
+}  // namespace
+
+std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior) { return row(type).make(prior); }
+kernels::ModelKind to_kernel(ModelType type) noexcept { return row(type).kernel; }
+
+}  // namespace models
+
+std::string_view name(ModelType type) noexcept { return kernels::traits(models::to_kernel(type)).name; }
+
+int dimension(ModelType type) noexcept { return kernels::traits(models::to_kernel(type)).dimension; }
+
+std::span<const ModelType> model_types() noexcept {
+  static constexpr auto types = [] {
+    std::array<ModelType, models::kKinds.size()> all{};
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] = models::kKinds[i].type;
+    return all;
+  }();
+  return types;
+}
+
+Expected<ModelType> model_type(std::string_view wanted) {
+  std::string known;
+  for (const ModelType type : model_types()) {
+    if (name(type) == wanted) return type;
+    known += (known.empty() ? "" : ", ") + std::string(name(type));
+  }
+  return fail(Error::Kind::invalid_option, fmt::format("model is '{}', must be one of: {}", wanted, known));
+}
+
+}  // namespace swarmfit

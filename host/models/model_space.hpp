@@ -1,0 +1,74 @@
+// What the swarm needs to know of a kind of model: where positions come from, how they differ and move, and how they are refined.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include <Eigen/Core>
+
+#include <swarmfit/fit.hpp>
+#include <swarmfit/model.hpp>
+
+#include "host/models/working_points.hpp"
+#include "kernels/models/models.hpp"
+
+namespace swarmfit::models {
+
+/// A position: the model's parameters in the working frame. A velocity has the same number of entries.
+using Position = Eigen::VectorXd;
+
+/// Points and weights of a least-squares problem.
+struct Weighted {
+  std::span<const std::uint32_t> index;
+  std::span<const double> weight;
+};
+
+class ModelSpace {
+ public:
+  virtual ~ModelSpace() = default;
+
+  virtual ModelType type() const noexcept = 0;
+  virtual kernels::ModelKind kind() const noexcept = 0;
+  /// Points that determine a model.
+  virtual int minimal_sample() const noexcept = 0;
+  /// Entries of a position.
+  virtual int parameter_count() const noexcept = 0;
+  /// Degrees of freedom: rank of the covariance.
+  virtual int freedom() const noexcept = 0;
+
+  /// The model through a minimal sample; false if the sample is degenerate (coincident or collinear points).
+  virtual bool from_sample(const WorkingPoints& points, std::span<const std::uint32_t> sample, Position& theta) const = 0;
+  /// The velocity at `from` that leads to `to` in one step: the logarithm map.
+  virtual void difference(const Position& from, const Position& to, Eigen::Ref<Eigen::VectorXd> velocity) const = 0;
+  /// theta moves by velocity (the exponential map) and the velocity is carried along, to stay tangent.
+  virtual void move(Position& theta, Eigen::Ref<Eigen::VectorXd> velocity) const = 0;
+  /// D(a, b) of Eq. (5): length of the shortest way, angles in rad, lengths in units of the working frame.
+  virtual double distance(const Position& a, const Position& b) const = 0;
+  /// The weighted least-squares model; false if the points do not determine one.
+  virtual bool refine(const WorkingPoints& points, const Weighted& support, Position& theta) const = 0;
+  /// Covariance of a least-squares position given unit residual variance, in the working frame.
+  virtual Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+
+  /// Parameters in the data's frame and unit, as results and kernels take them, and back.
+  virtual Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const = 0;
+  virtual Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const = 0;
+  /// Covariance of the data-frame parameters from that of the position.
+  virtual Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const = 0;
+
+  /// Pulls a position back inside the prior, if there is one; false where that cannot be done.
+  virtual bool admit(Position& theta) const = 0;
+};
+
+/// The space of a kind, with an optional prior on its direction.
+std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior);
+
+/// The kernels' name of a kind.
+kernels::ModelKind to_kernel(ModelType type) noexcept;
+
+// One factory a kind, each in its own file.
+std::unique_ptr<ModelSpace> make_line2d_space(const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_plane_space(const std::optional<DirectionPrior>& prior);
+
+}  // namespace swarmfit::models

@@ -1,0 +1,140 @@
+// The public face of the fit: options and points are checked here, the work is done in multi_model.cpp.
+#include <cmath>
+#include <new>
+
+#include <fmt/format.h>
+
+#include <swarmfit/fit.hpp>
+
+#include "host/models/model_space.hpp"
+#include "host/swarm/multi_model.hpp"
+#include "host/swarm/noise_scale.hpp"
+#include "host/swarm/settings.hpp"
+#include "kernels/evaluators.hpp"
+
+namespace swarmfit {
+namespace {
+
+constexpr double kPlaneThreshold = 0.01;  // [m], design 4
+
+/// The kind's fixed default, or none where the threshold is estimated.
+std::optional<double> default_threshold(ModelType type) {
+  return type == ModelType::plane ? std::optional<double>(kPlaneThreshold) : std::nullopt;
+}
+
+Expected<> check_points(const PointsView& points, const models::WorkingPoints& working, const models::ModelSpace& space) {
+  const auto least = static_cast<std::size_t>(space.minimal_sample());
+  if (points.size() < least) {
+    return fail(Error::Kind::bad_input, fmt::format("points is {}, must be >= {} to fit a {}", points.size(), least, name(space.type())));
+  }
+  if (working.finite_count() < least) {
+    return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= {} to fit a {}", working.finite_count(),
+                                                    points.size(), least, name(space.type())));
+  }
+  if (working.rank() < space.minimal_sample() - 1) {
+    const char* shape = working.rank() == 0 ? "all coincide" : "are collinear";
+    return fail(Error::Kind::bad_input, fmt::format("the {} finite points {}: rank is {}, must be >= {} to fit a {}",
+                                                    working.finite_count(), shape, working.rank(), space.minimal_sample() - 1,
+                                                    name(space.type())));
+  }
+  return {};
+}
+
+}  // namespace
+
+struct Fitter::State {
+  FitOptions options;
+  std::unique_ptr<kernels::FitnessEvaluator> evaluator;
+  std::string reason;
+};
+
+Fitter::Fitter(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Fitter::~Fitter() = default;
+Fitter::Fitter(Fitter&&) noexcept = default;
+Fitter& Fitter::operator=(Fitter&&) noexcept = default;
+
+Expected<Fitter> Fitter::create(const FitOptions& options) {
+  if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
+  kernels::EvaluatorOptions wanted;
+  wanted.threads = options.threads;
+  wanted.pipeline_cache = options.pipeline_cache;
+  auto made = kernels::make_evaluator(options.backend, wanted);
+  if (!made) return tl::unexpected(swarm::to_error(made.error()));
+  auto state = std::make_unique<State>();
+  state->options = options;
+  state->evaluator = std::move(made->evaluator);
+  state->reason = std::move(made->reason);
+  return Fitter(std::move(state));
+}
+
+const FitOptions& Fitter::options() const noexcept { return state_->options; }
+
+BackendInfo Fitter::backend() const {
+  const kernels::Identity& who = state_->evaluator->identity();
+  return {who.backend, who.device, state_->reason};
+}
+
+Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& on_model, std::stop_token stop,
+                                const std::vector<Model>& warm_start) try {
+  swarm::Limits limits;
+  limits.budget_ms = state_->options.time_budget_ms;
+  limits.stop = std::move(stop);
+  limits.max_models = state_->options.max_models;
+  const FitOptions& options = state_->options;
+  const auto space = models::make_space(options.model, options.prior);
+  if (points.dimension() != dimension(options.model)) {
+    return fail(Error::Kind::bad_input, fmt::format("points have {} columns, must have {} to fit a {}", points.dimension(),
+                                                    dimension(options.model), name(options.model)));
+  }
+  const models::WorkingPoints working(points);
+  if (auto ok = check_points(points, working, *space); !ok) return tl::unexpected(ok.error());
+  kernels::FitnessEvaluator& evaluator = *state_->evaluator;
+  const std::size_t particles = static_cast<std::size_t>(options.particles.value_or(100));
+  if (const auto support = evaluator.supports({space->kind(), points.size(), particles}); !support) {
+    return fail(Error::Kind::backend_unavailable, support.reason);
+  }
+  if (auto done = evaluator.set_points(models::to_kernel(points)); !done) return tl::unexpected(swarm::to_error(done.error()));
+
+  FitResult result;
+  const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
+  if (options.estimate_threshold || !given) {
+    auto estimated = swarm::estimate_threshold(evaluator, *space, working, options);
+    if (!estimated) return tl::unexpected(estimated.error());
+    result.threshold = *estimated;
+  } else {
+    result.threshold = *given;
+  }
+  const swarm::Settings settings = swarm::resolve(options, working.finite_count(), result.threshold);
+  swarm::MultiModel search(evaluator, *space, working, settings, options.seed, limits);
+  if (auto done = search.run(on_model, warm_start, result); !done) return tl::unexpected(done.error());
+  result.backend = backend();
+  result.seed = options.seed;
+  result.finite_points = working.finite_count();
+  result.total_ms = std::chrono::duration<double, std::milli>(swarm::Clock::now() - limits.start).count();
+  return result;
+} catch (const std::bad_alloc&) {
+  return fail(Error::Kind::out_of_memory, fmt::format("no memory for {} points", points.size()));
+}
+
+std::string FitResult::brief() const {
+  std::size_t explained = 0;
+  for (const Model& model : models) explained += model.inliers;
+  return fmt::format("{} models explain {} of {} points at threshold {:.4g} in {:.1f} ms on {} ({}); {}", models.size(), explained,
+                     finite_points, threshold, total_ms, backend.name, backend.device, stop_reason);
+}
+
+std::vector<Device> devices() {
+  std::vector<Device> all;
+  for (kernels::DeviceDescription& d : kernels::list_devices()) {
+    all.push_back({std::move(d.backend), std::move(d.device), std::move(d.kind), d.usable, std::move(d.reason), std::move(d.limits)});
+  }
+  return all;
+}
+
+Expected<FitResult> fit(const PointsView& points, const FitOptions& options, const ModelCallback& on_model) {
+  auto fitter = Fitter::create(options);
+  if (!fitter) return tl::unexpected(fitter.error());
+  return fitter->fit(points, on_model);
+}
+
+}  // namespace swarmfit

@@ -1,0 +1,43 @@
+// The function that a swarm searches: the truncated loss under the current caps, deflated by Eq. (5) where that is asked for.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <swarmfit/error.hpp>
+
+#include "host/models/model_space.hpp"
+#include "host/swarm/settings.hpp"
+#include "kernels/fitness_evaluator.hpp"
+
+namespace swarmfit::swarm {
+
+/// A kernels::Failure in the public words.
+Error to_error(const kernels::Failure& failure);
+
+class Landscape {
+ public:
+  Landscape(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::Frame& frame, const Settings& settings)
+      : evaluator_(evaluator), space_(space), frame_(frame), settings_(settings) {}
+
+  /// Adds a found optimum to O of Eq. (5); without effect on the fitness under residual deflation, whose caps are the evaluator's.
+  void deflate_around(const models::Position& optimum) { optima_.push_back(optimum); }
+
+  /// fitness[j] of positions[j], exact where it is below bests[j]. Sizes must be equal.
+  Expected<> fitness(std::span<const models::Position> positions, std::span<const double> bests, std::span<double> fitness);
+  /// Truncated loss f of one position, not deflated.
+  Expected<double> loss(const models::Position& theta);
+
+ private:
+  double deflation(const models::Position& theta) const;
+
+  kernels::FitnessEvaluator& evaluator_;
+  const models::ModelSpace& space_;
+  const models::Frame& frame_;
+  const Settings& settings_;
+  std::vector<models::Position> optima_;
+  std::vector<double> parameters_, factor_;
+  std::vector<float> cutoffs_, costs_;
+};
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,222 @@
+#include "host/swarm/multi_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/swarm/payment.hpp"
+#include "host/swarm/sampler.hpp"
+#include "host/swarm/swarm.hpp"
+
+namespace swarmfit::swarm {
+namespace {
+
+constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
+
+}  // namespace
+
+MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points,
+                       const Settings& settings, std::uint64_t seed, Limits limits)
+    : evaluator_(evaluator), space_(space), points_(points), settings_(settings), random_(seed), limits_(std::move(limits)),
+      landscape_(evaluator, space, points.frame(), settings) {
+  tau_.assign(points.size(), static_cast<float>(settings.threshold));
+  caps_.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) caps_[i] = points.finite(i) ? tau_[i] : 0.0F;
+  distances_.resize(points.size());
+}
+
+double MultiModel::elapsed_ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - limits_.start).count(); }
+
+std::optional<std::string> MultiModel::interrupted() const {
+  if (limits_.stop.stop_requested()) return "cancelled";
+  if (limits_.budget_ms > 0 && elapsed_ms() >= limits_.budget_ms) return "time budget used up";
+  return std::nullopt;
+}
+
+Expected<> MultiModel::distances(const models::Position& theta) {
+  const Eigen::VectorXd data = space_.to_data(theta, points_.frame());
+  const kernels::ModelView model{space_.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
+  if (auto done = evaluator_.distances(model, distances_); !done) return tl::unexpected(to_error(done.error()));
+  return {};
+}
+
+Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result) {
+  if (auto done = evaluator_.set_caps(caps_); !done) return tl::unexpected(to_error(done.error()));
+  std::vector<models::Position> seeds;
+  for (const Model& model : warm_start) {
+    models::Position theta = space_.from_data(model.parameters, points_.frame());
+    if (space_.admit(theta)) seeds.push_back(std::move(theta));
+  }
+  int unpaid = 0;
+  for (std::uint32_t round = 0; stop_reason_.empty(); ++round) {
+    if (limits_.max_models > 0 && found_.size() >= limits_.max_models) {
+      stop_reason_ = "max-models reached";
+      break;
+    }
+    models::Position theta;
+    double loss = 0;
+    auto outcome = search(round, seeds, theta, loss);
+    if (!outcome) return tl::unexpected(outcome.error());
+    if (*outcome == Outcome::interrupted) break;
+    if (*outcome == Outcome::found) {
+      unpaid = 0;
+      auto go_on = accept(theta, loss, on_model, result);
+      if (!go_on) return tl::unexpected(go_on.error());
+      if (!*go_on) stop_reason_ = "stopped by the caller";
+      continue;
+    }
+    if (settings_.deflation == Deflation::parametric) landscape_.deflate_around(theta);
+    if (*outcome == Outcome::complete) {
+      stop_reason_ = "complete: the list of global bests is stable";
+    } else if (++unpaid >= settings_.patience) {
+      stop_reason_ = "complete: no further model pays for itself";
+    }
+  }
+  result.stop_reason = stop_reason_;
+  return finish(result);
+}
+
+Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta,
+                                                 double& loss) {
+  Sampler sampler(points_, space_, random_);
+  sampler.prefer_unexplained(caps_, 0.5, static_cast<float>(settings_.threshold));
+  double unexplained = 0;
+  for (const float cap : caps_) unexplained += static_cast<double>(cap);
+  scale_ = settings_.deflation == Deflation::parametric
+               ? settings_.threshold * static_cast<double>(points_.finite_count())
+               : unexplained;
+  Swarm swarm(space_, settings_, random_);
+  steps_ = 0;
+  if (!swarm.start(sampler, round, seeds)) {
+    stop_reason_ = "complete: what is left determines no model";
+    return Outcome::interrupted;
+  }
+  while (!swarm.converged() && swarm.steps() < settings_.iterations) {
+    if (auto reason = interrupted()) {
+      stop_reason_ = *reason;
+      return Outcome::interrupted;
+    }
+    if (auto done = swarm.step(landscape_, sampler, scale_); !done) return tl::unexpected(done.error());
+  }
+  steps_ = static_cast<std::size_t>(swarm.steps());
+  theta = swarm.best();
+  auto exact = landscape_.loss(theta);
+  if (!exact) return tl::unexpected(exact.error());
+  loss = *exact;
+  if (settings_.refine) {
+    const Ground ground{evaluator_, space_, points_, tau_};
+    if (auto done = refine_one(ground, landscape_, caps_, theta, loss); !done) return tl::unexpected(done.error());
+  }
+  if (auto done = distances(theta); !done) return tl::unexpected(done.error());
+  if (pays(count_support(distances_, caps_, tau_), settings_, space_.minimal_sample())) return Outcome::found;
+  const auto& list = swarm.global_bests();
+  const bool stable = list.front().fitness - list.back().fitness < kStable * scale_;
+  return settings_.deflation == Deflation::parametric && stable ? Outcome::complete : Outcome::unpaid;
+}
+
+Expected<bool> MultiModel::accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result) {
+  const kernels::Effort effort = evaluator_.effort();
+  Model model;
+  model.type = space_.type();
+  model.parameters = space_.to_data(theta, points_.frame());
+  model.cost = loss;
+  model.iterations = steps_;
+  model.evaluations = static_cast<std::size_t>(effort.evaluations) - result.evaluations;
+  model.points_touched = effort.point_models > 0 ? static_cast<double>(effort.touched) / static_cast<double>(effort.point_models) : 1.0;
+  model.found_at_ms = elapsed_ms();
+  double square = 0;
+  for (std::size_t i = 0; i < distances_.size(); ++i) {
+    if (distances_[i] <= tau_[i] && caps_[i] >= 0.5F * tau_[i]) {
+      ++model.inliers;
+      square += static_cast<double>(distances_[i]) * distances_[i];
+    }
+  }
+  model.rms = model.inliers > 0 ? std::sqrt(square / static_cast<double>(model.inliers)) : 0.0;
+  found_.push_back(theta);
+  result.models.push_back(model);
+  result.iterations += steps_;
+  result.evaluations = static_cast<std::size_t>(effort.evaluations);
+  if (settings_.deflation == Deflation::parametric) landscape_.deflate_around(theta);
+  if (auto done = deflate(distances_); !done) return tl::unexpected(done.error());
+  return !on_model || on_model(result.models.back()) == Verdict::go_on;
+}
+
+Expected<> MultiModel::deflate(std::span<const float> distances) {
+  const auto slope = static_cast<float>(settings_.dead_zone_slope);
+  for (std::size_t i = 0; i < caps_.size(); ++i) {
+    if (std::isnan(distances[i])) continue;
+    caps_[i] = std::min(caps_[i], std::max(0.0F, slope * (distances[i] - tau_[i])));
+  }
+  if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
+  if (auto done = evaluator_.set_caps(caps_); !done) return tl::unexpected(to_error(done.error()));
+  return {};
+}
+
+Expected<> MultiModel::finish(FitResult& result) {
+  if (settings_.joint && !found_.empty() && !limits_.stop.stop_requested()) {
+    const Ground ground{evaluator_, space_, points_, tau_};
+    if (auto energy = refine_jointly(ground, found_); !energy) return tl::unexpected(energy.error());
+    if (auto done = drop_unpaid(result); !done) return done;
+    for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
+  }
+  if (auto done = label(result); !done) return done;
+  const kernels::Effort effort = evaluator_.effort();
+  result.evaluations = static_cast<std::size_t>(effort.evaluations);
+  result.points_touched = effort.point_models > 0 ? static_cast<double>(effort.touched) / static_cast<double>(effort.point_models) : 1.0;
+  return describe(result);
+}
+
+Expected<> MultiModel::drop_unpaid(FitResult& result) {
+  while (found_.size() > 1) {
+    if (auto done = label(result); !done) return done;
+    std::vector<std::size_t> own(found_.size(), 0);
+    for (const std::uint16_t k : result.labels) {
+      if (k > 0) ++own[k - 1U];
+    }
+    const auto least = std::min_element(own.begin(), own.end());
+    if (2 * *least >= settings_.min_inliers) return {};
+    found_.erase(found_.begin() + (least - own.begin()));
+    result.models.erase(result.models.begin() + (least - own.begin()));
+    const Ground ground{evaluator_, space_, points_, tau_};
+    if (auto energy = refine_jointly(ground, found_); !energy) return tl::unexpected(energy.error());
+  }
+  return {};
+}
+
+Expected<> MultiModel::label(FitResult& result) {
+  std::vector<Eigen::VectorXd> parameters;
+  parameters.reserve(found_.size());
+  std::vector<kernels::ModelView> views;
+  for (const models::Position& theta : found_) {
+    parameters.push_back(space_.to_data(theta, points_.frame()));
+    views.push_back({space_.kind(), std::span<const double>(parameters.back().data(), static_cast<std::size_t>(parameters.back().size()))});
+  }
+  result.labels.assign(points_.size(), 0);
+  const auto tau = static_cast<float>(settings_.threshold);
+  if (auto done = evaluator_.assign(views, std::span<const float>(&tau, 1), result.labels); !done) {
+    return tl::unexpected(to_error(done.error()));
+  }
+  return {};
+}
+
+Expected<> MultiModel::describe(FitResult& result) {
+  const models::Frame& frame = points_.frame();
+  std::vector<std::vector<std::uint32_t>> own(found_.size());
+  for (std::size_t i = 0; i < result.labels.size(); ++i) {
+    if (result.labels[i] > 0) own[result.labels[i] - 1U].push_back(static_cast<std::uint32_t>(i));
+  }
+  for (std::size_t m = 0; m < found_.size(); ++m) {
+    if (auto done = distances(found_[m]); !done) return done;
+    Model& model = result.models[m];
+    double square = 0;
+    for (const std::uint32_t i : own[m]) square += static_cast<double>(distances_[i]) * distances_[i];
+    const auto n = static_cast<double>(own[m].size());
+    model.inliers = own[m].size();
+    model.rms = n > 0 ? std::sqrt(square / n) : 0.0;
+    const double variance = square / std::max(1.0, n - space_.freedom()) / (frame.scale * frame.scale);
+    const std::vector<double> weight(own[m].size(), 1.0);
+    model.covariance = space_.covariance_to_data(variance * space_.unit_covariance(points_, {own[m], weight}, found_[m]), found_[m], frame);
+  }
+  return {};
+}
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,85 @@
+#include "host/swarm/noise_scale.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host/swarm/multi_model.hpp"
+
+namespace swarmfit::swarm {
+namespace {
+
+constexpr double kSigmas = 2.5;         // 98.8 % of a Gaussian lie within
+constexpr double kGenerous = 0.08;      // first threshold, in units of the cloud's own spread
+constexpr double kLeast = 1e-6;         // no threshold below this, in the same units: float coordinates carry no more
+constexpr int kRounds = 6;
+
+}  // namespace
+
+double gaussian_part(std::span<const float> distances, double guess, double reach) {
+  std::vector<double> d;
+  for (const float v : distances) {
+    if (v <= reach) d.push_back(static_cast<double>(v));
+  }
+  if (d.empty()) return 0;
+  double sigma = guess, share = 0.5;
+  for (int round = 0; round < 60; ++round) {
+    // |d| of a Gaussian has density 2 N(d; 0, sigma) on d >= 0; the background 1 / reach.
+    const double peak = 2.0 / (sigma * 2.5066282746310002);
+    double mass = 0, square = 0;
+    for (const double v : d) {
+      const double inlier = share * peak * std::exp(-0.5 * v * v / (sigma * sigma));
+      const double p = inlier / (inlier + (1 - share) / reach);
+      mass += p;
+      square += p * v * v;
+    }
+    if (!(mass > 0)) return 0;
+    const double next = std::sqrt(square / mass);
+    share = std::clamp(mass / static_cast<double>(d.size()), 1e-3, 1 - 1e-3);
+    const bool settled = std::abs(next - sigma) <= 1e-4 * sigma;
+    sigma = std::max(next, 1e-12 * reach);
+    if (settled) break;
+  }
+  return sigma;
+}
+
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
+                                    const models::WorkingPoints& points, const FitOptions& options) {
+  const double unit = points.frame().scale;
+  double tau = kGenerous * unit;
+  std::vector<float> distances(points.size());
+  for (int round = 0; round < kRounds; ++round) {
+    Settings settings = resolve(options, points.finite_count(), tau);
+    settings.joint = true;
+    MultiModel search(evaluator, space, points, settings, options.seed + static_cast<std::uint64_t>(round) + 1, Limits{});
+    FitResult result;
+    if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
+    // Median over the models' points: each model votes with what it holds.
+    std::vector<std::pair<double, std::size_t>> votes;
+    std::size_t total = 0;
+    for (const Model& model : result.models) {
+      const kernels::ModelView view{space.kind(),
+                                    std::span<const double>(model.parameters.data(), static_cast<std::size_t>(model.parameters.size()))};
+      if (auto done = evaluator.distances(view, distances); !done) return tl::unexpected(to_error(done.error()));
+      votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), model.inliers);
+      total += model.inliers;
+    }
+    if (votes.empty()) break;
+    std::sort(votes.begin(), votes.end());
+    std::size_t below = 0;
+    double sigma = votes.back().first;
+    for (const auto& [value, weight] : votes) {
+      below += weight;
+      if (2 * below >= total) {
+        sigma = value;
+        break;
+      }
+    }
+    const double next = std::max(kSigmas * sigma, kLeast * unit);
+    const bool settled = std::abs(next - tau) <= 0.05 * tau;
+    tau = next;
+    if (settled) break;
+  }
+  return tau;
+}
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,20 @@
+// The threshold from the data themselves.
+#pragma once
+
+#include <swarmfit/fit.hpp>
+
+#include "host/models/model_space.hpp"
+#include "kernels/fitness_evaluator.hpp"
+
+namespace swarmfit::swarm {
+
+/// Standard deviation of the Gaussian part of |distances| within `reach`, against a uniform background; by expectation-maximisation
+/// from `guess`. Distances beyond reach and NaN are left out. 0 where there is none.
+double gaussian_part(std::span<const float> distances, double guess, double reach);
+
+/// tau = 2.5 sigma, sigma the noise of the most prominent models: a swarm finds one under a generous threshold, the spread of its
+/// inliers gives the next threshold, until that stays. Fails with bad_input where the data show no scale.
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
+                                    const models::WorkingPoints& points, const FitOptions& options);
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,27 @@
+// Whether a model pays for itself: enough points of its own, and more of them than chance would put there.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "host/swarm/settings.hpp"
+
+namespace swarmfit::swarm {
+
+/// What a candidate explains of what nobody has explained yet.
+struct Support {
+  std::size_t inliers = 0;     ///< unexplained points within tau
+  std::size_t band = 0;        ///< unexplained points between tau and 3 tau: what surrounds the model
+  std::size_t unexplained = 0; ///< all unexplained points
+};
+
+/// A point is unexplained while its cap is at least half of its tau. NaN distances count for nothing.
+Support count_support(std::span<const float> distances, std::span<const float> caps, std::span<const float> tau);
+
+/// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
+/// binomial tail, background density from the band, one test for each minimal sample of the points). Lower is more meaningful.
+double log_false_alarms(const Support& support, int minimal_sample);
+
+bool pays(const Support& support, const Settings& settings, int minimal_sample);
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,94 @@
+#include "host/swarm/refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swarmfit::swarm {
+namespace {
+
+constexpr int kRounds = 8;
+constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
+
+Expected<> measure(const Ground& ground, const models::Position& theta, std::vector<float>& distances) {
+  const Eigen::VectorXd data = ground.space.to_data(theta, ground.points.frame());
+  distances.resize(ground.points.size());
+  const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
+  if (auto done = ground.evaluator.distances(model, distances); !done) return tl::unexpected(to_error(done.error()));
+  return {};
+}
+
+/// Distances of every model; nearest model of each point (models.size() if none within tau) and the joint energy.
+Expected<double> nearest(const Ground& ground, const std::vector<models::Position>& models, std::vector<std::size_t>& owner) {
+  std::vector<float> distances;
+  std::vector<float> least(ground.tau.begin(), ground.tau.end());
+  owner.assign(ground.points.size(), models.size());
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (distances[i] < least[i]) {
+        least[i] = distances[i];
+        owner[i] = m;
+      }
+    }
+  }
+  double energy = 0;
+  for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(i) ? static_cast<double>(least[i]) : 0.0;
+  return energy;
+}
+
+}  // namespace
+
+Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<const float> caps, models::Position& theta, double& loss) {
+  std::vector<float> distances;
+  std::vector<std::uint32_t> index;
+  std::vector<double> weight;
+  for (int round = 0; round < kRounds; ++round) {
+    const models::Position& from = theta;
+    if (auto done = measure(ground, from, distances); !done) return done;
+    index.clear();
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (distances[i] <= ground.tau[i] && distances[i] <= caps[i]) index.push_back(static_cast<std::uint32_t>(i));
+    }
+    weight.assign(index.size(), 1.0);
+    models::Position candidate = theta;
+    if (!ground.space.refine(ground.points, {index, weight}, candidate)) return {};
+    auto cost = landscape.loss(candidate);
+    if (!cost) return tl::unexpected(cost.error());
+    if (!(*cost < loss)) return {};
+    const bool worthwhile = loss - *cost > kWorthwhile * loss;
+    theta = candidate;
+    loss = *cost;
+    if (!worthwhile) return {};
+  }
+  return {};
+}
+
+Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models) {
+  std::vector<std::size_t> owner;
+  auto energy = nearest(ground, models, owner);
+  if (!energy) return energy;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<models::Position> candidates = models;
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      std::vector<std::uint32_t> index;
+      for (std::size_t i = 0; i < owner.size(); ++i) {
+        if (owner[i] == m) index.push_back(static_cast<std::uint32_t>(i));
+      }
+      const std::vector<double> weight(index.size(), 1.0);
+      if (!ground.space.refine(ground.points, {index, weight}, candidates[m])) candidates[m] = models[m];
+    }
+    std::vector<std::size_t> next;
+    auto candidate_energy = nearest(ground, candidates, next);
+    if (!candidate_energy) return candidate_energy;
+    if (!(*candidate_energy < *energy)) break;
+    const bool worthwhile = *energy - *candidate_energy > kWorthwhile * *energy;
+    models = std::move(candidates);
+    owner = std::move(next);
+    energy = candidate_energy;
+    if (!worthwhile) break;
+  }
+  return energy;
+}
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,91 @@
+#include "host/swarm/settings.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "host/models/model_space.hpp"
+
+namespace swarmfit {
+namespace {
+
+/// `ok` is false for NaN as well, if it is written as a positive comparison.
+template <class T>
+Expected<> require(bool ok, const char* field, const T& value, const char* bound) {
+  if (ok) return {};
+  return fail(Error::Kind::invalid_option, fmt::format("{} is {}, must be {}", field, value, bound));
+}
+
+bool positive(double v) { return v > 0 && std::isfinite(v); }
+
+Expected<> check_prior(const DirectionPrior& prior) {
+  if (!(prior.axis.allFinite() && prior.axis.norm() > 0)) {
+    return fail(Error::Kind::invalid_option, fmt::format("prior.axis is ({}, {}, {}), must be finite and not zero", prior.axis.x(),
+                                                         prior.axis.y(), prior.axis.z()));
+  }
+  return require(prior.max_angle > 0 && prior.max_angle <= 1.5707963267948968, "prior.max_angle", prior.max_angle, "in (0, pi/2] rad");
+}
+
+}  // namespace
+
+Expected<> FitOptions::validate() const {
+  Expected<> checks[] = {
+      require(!threshold || positive(*threshold), "threshold", threshold.value_or(0), "finite and > 0"),
+      require(!particles || (*particles >= 2 && *particles <= 1'000'000), "particles", particles.value_or(0), "in [2, 1000000]"),
+      require(!iterations || *iterations >= 1, "iterations", iterations.value_or(0), ">= 1"),
+      require(!stall || *stall >= 1, "stall", stall.value_or(0), ">= 1"),
+      require(!lambda || positive(*lambda), "lambda", lambda.value_or(0), "finite and > 0"),
+      require(max_models <= 65534, "max-models", max_models, "<= 65534"),
+      require(time_budget_ms >= 0 && std::isfinite(time_budget_ms), "time-budget", time_budget_ms, "finite and >= 0 ms"),
+      require(threads >= 0 && threads <= 4096, "threads", threads, "in [0, 4096]"),
+      require(!backend.empty(), "backend", "''", "a name"),
+  };
+  for (Expected<>& check : checks) {
+    if (!check) return std::move(check);
+  }
+  return prior ? check_prior(*prior) : Expected<>{};
+}
+
+namespace swarm {
+namespace {
+
+Settings preset(Preset preset) {
+  Settings s;
+  if (preset == Preset::paper) {
+    s.deflation = Deflation::parametric;
+    s.refine = false;
+    s.joint = false;
+    s.patience = 1;
+    return s;
+  }
+  s.particles = 100;
+  s.iterations = 100;
+  s.stall = 10;
+  s.topology = Topology::ring;
+  s.local_share = 0.5;
+  s.still = 1e-3;
+  return s;
+}
+
+}  // namespace
+
+Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold) {
+  Settings s = preset(options.preset);
+  s.particles = options.particles.value_or(s.particles);
+  s.iterations = options.iterations.value_or(s.iterations);
+  s.stall = options.stall.value_or(s.stall);
+  s.deflation = options.deflation.value_or(s.deflation);
+  s.lambda = options.lambda.value_or(s.lambda);
+  s.loss = options.loss.value_or(s.loss);
+  s.threshold = threshold;
+  // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.
+  const std::size_t share = finite_points / 100;
+  const auto least = static_cast<std::size_t>(2 * models::make_space(options.model, {})->minimal_sample() + 1);
+  s.min_inliers = options.min_inliers > 0 ? options.min_inliers : std::max(share, least);
+  return s;
+}
+
+}  // namespace swarm
+}  // namespace swarmfit

@@ -1,0 +1,155 @@
+#include "host/swarm/swarm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swarmfit::swarm {
+
+double constriction(double c1, double c2) {
+  const double c = c1 + c2;
+  return c > 4 ? 2.0 / std::abs(2.0 - c - std::sqrt(c * c - 4.0 * c)) : 1.0;
+}
+
+std::size_t roulette(std::span<const double> fitness, double u) {
+  const double worst = *std::max_element(fitness.begin(), fitness.end());
+  double total = 0;
+  for (const double f : fitness) total += worst - f;
+  if (!(total > 0)) return fitness.size() - 1;
+  double at = u * total;
+  for (std::size_t k = 0; k < fitness.size(); ++k) {
+    at -= worst - fitness[k];
+    if (at < 0) return k;
+  }
+  return fitness.size() - 1;
+}
+
+Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random)
+    : space_(space), settings_(settings), random_(random), chi_(constriction(settings.cognitive, settings.social)) {
+  const auto m = static_cast<std::size_t>(settings.particles);
+  positions_.resize(m);
+  velocities_.resize(m);
+  own_best_.resize(m);
+  fitness_.resize(m);
+  own_fitness_.resize(m);
+}
+
+bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds) {
+  round_ = round;
+  steps_ = 0;
+  still_steps_ = 0;
+  list_.clear();
+  const std::size_t m = positions_.size();
+  const auto local = static_cast<std::size_t>(settings_.local_share * static_cast<double>(m));
+  std::size_t sampled = 0;
+  for (std::size_t j = 0; j < m; ++j) {
+    if (j < seeds.size()) {
+      positions_[j] = seeds[j];
+      ++sampled;
+    } else if (sampler.draw(j % m < local, round, 0, static_cast<std::uint32_t>(j), positions_[j])) {
+      ++sampled;
+    } else {
+      positions_[j] = sampled > 0 ? positions_[j - 1] : models::Position();
+    }
+    if (sampled == 0) return false;
+  }
+  const auto width = space_.parameter_count();
+  for (std::size_t j = 0; j < m; ++j) {
+    // A random velocity of the size of the swarm itself: part of the way to another particle.
+    const auto words = random_.words(Draw::move, round, 0, static_cast<std::uint32_t>(j));
+    velocities_[j].resize(width);
+    space_.difference(positions_[j], positions_[Random::below(words[0], m)], velocities_[j]);
+    velocities_[j] *= 0.5 * Random::unit(words[1]);
+  }
+  std::fill(own_fitness_.begin(), own_fitness_.end(), std::numeric_limits<double>::infinity());
+  return true;
+}
+
+Expected<> Swarm::step(Landscape& landscape, const Sampler& sampler, double scale) {
+  scale_ = scale;
+  if (auto done = landscape.fitness(positions_, own_fitness_, fitness_); !done) return done;
+  ++steps_;
+  remember();
+  move(sampler);
+  return {};
+}
+
+void Swarm::remember() {
+  std::size_t best = positions_.size();
+  for (std::size_t j = 0; j < positions_.size(); ++j) {
+    if (fitness_[j] < own_fitness_[j]) {
+      own_fitness_[j] = fitness_[j];
+      own_best_[j] = positions_[j];
+    }
+    if (list_.empty() || fitness_[j] < list_.back().fitness) {
+      if (best == positions_.size() || fitness_[j] < fitness_[best]) best = j;
+    }
+  }
+  ++still_steps_;
+  if (best == positions_.size()) {
+    if (list_.empty()) list_.push_back({positions_[0], fitness_[0]});  // every fitness is infinite
+    return;
+  }
+  const bool first = list_.empty();
+  list_.push_back({positions_[best], fitness_[best]});
+  if (list_.size() > static_cast<std::size_t>(settings_.roulette_length)) list_.pop_front();
+  const double saving = scale_ - fitness_[best];
+  if (first || still_since_ - fitness_[best] > settings_.still * std::max(saving, 0.0)) {
+    still_steps_ = 0;
+    still_since_ = fitness_[best];
+  }
+}
+
+const models::Position& Swarm::attractor(std::size_t particle, std::uint32_t word) const {
+  if (settings_.topology == Topology::roulette) {
+    std::vector<double> shares(list_.size());
+    std::transform(list_.begin(), list_.end(), shares.begin(), [](const GlobalBest& g) { return g.fitness; });
+    return list_[roulette(shares, Random::unit(word))].position;
+  }
+  const std::size_t m = positions_.size();
+  std::size_t best = particle;
+  for (int k = -settings_.ring_radius; k <= settings_.ring_radius; ++k) {
+    const auto shift = static_cast<std::size_t>(k + static_cast<int>(m));
+    const std::size_t other = (particle + shift) % m;
+    if (own_fitness_[other] < own_fitness_[best]) best = other;
+  }
+  return own_best_[best];
+}
+
+void Swarm::move(const Sampler& sampler) {
+  const auto width = static_cast<std::size_t>(space_.parameter_count());
+  const auto steps = static_cast<std::uint32_t>(steps_);
+  Eigen::VectorXd to_own(static_cast<Eigen::Index>(width)), to_best(static_cast<Eigen::Index>(width));
+  models::Position before;
+  const auto renewed = static_cast<std::size_t>(settings_.renewal_share * static_cast<double>(positions_.size()));
+  for (std::size_t j = 0; j < positions_.size(); ++j) {
+    const auto particle = static_cast<std::uint32_t>(j);
+    if (own_best_[j].size() == 0) own_best_[j] = positions_[j];
+    // The renewed places rotate through the ring, so that every neighbourhood is refreshed in turn.
+    if (renewed > 0 && (j + static_cast<std::size_t>(steps_) * renewed) % positions_.size() < renewed) {
+      if (sampler.draw((j & 1U) != 0 && settings_.local_share > 0, round_, steps, particle, positions_[j])) {
+        velocities_[j].setZero();
+        continue;
+      }
+    }
+    space_.difference(positions_[j], own_best_[j], to_own);
+    space_.difference(positions_[j], attractor(j, random_.words(Draw::roulette, round_, steps, particle)[0]), to_best);
+    for (std::size_t d = 0; d < width; d += 2) {
+      const auto words = random_.words(Draw::move, round_, steps, particle * 16 + static_cast<std::uint32_t>(d / 2));
+      for (std::size_t e = d; e < std::min(d + 2, width); ++e) {
+        const auto at = static_cast<Eigen::Index>(e);
+        const double r1 = Random::unit(words[2 * (e - d)]), r2 = Random::unit(words[2 * (e - d) + 1]);
+        velocities_[j][at] = chi_ * (settings_.inertia * velocities_[j][at] + settings_.cognitive * r1 * to_own[at] +
+                                     settings_.social * r2 * to_best[at]);  // Eq. (1)
+      }
+    }
+    before = positions_[j];
+    space_.move(positions_[j], velocities_[j]);
+    if (!space_.admit(positions_[j])) {
+      positions_[j] = before;
+      velocities_[j].setZero();
+    }
+  }
+}
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,66 @@
+// One swarm: particles that fly over a landscape until the best place found has stood still (Algorithm 1 of Zhou et al. 2010).
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "host/models/model_space.hpp"
+#include "host/swarm/landscape.hpp"
+#include "host/swarm/random.hpp"
+#include "host/swarm/sampler.hpp"
+#include "host/swarm/settings.hpp"
+
+namespace swarmfit::swarm {
+
+/// chi = 2 / |2 - c - sqrt(c^2 - 4 c)|, c = c1 + c2: the constriction factor of Eq. (1). 1 where c <= 4.
+double constriction(double c1, double c2);
+
+/// Eq. (2): index drawn from a list of fitnesses to be minimised, with shares by improvement over the worst of the list.
+/// `u` in [0, 1); all equal: the last, which is the newest.
+std::size_t roulette(std::span<const double> fitness, double u);
+
+struct GlobalBest {
+  models::Position position;
+  double fitness = 0;
+};
+
+class Swarm {
+ public:
+  Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random);
+
+  /// New particles from minimal samples, the first of them from `seeds`. False if the data yield no sample at all.
+  bool start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds);
+  /// Scores every particle, then moves it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
+  Expected<> step(Landscape& landscape, const Sampler& sampler, double scale);
+
+  bool converged() const noexcept { return still_steps_ >= settings_.stall; }
+  int steps() const noexcept { return steps_; }
+  const models::Position& best() const noexcept { return list_.back().position; }
+  double best_fitness() const noexcept { return list_.back().fitness; }
+  /// The last n global bests, oldest first.
+  const std::deque<GlobalBest>& global_bests() const noexcept { return list_; }
+  std::span<const models::Position> positions() const noexcept { return positions_; }
+  std::span<const double> fitness() const noexcept { return fitness_; }
+
+ private:
+  void remember();
+  void move(const Sampler& sampler);
+  const models::Position& attractor(std::size_t particle, std::uint32_t word) const;
+
+  const models::ModelSpace& space_;
+  const Settings& settings_;
+  const Random& random_;
+  double chi_;
+  std::uint32_t round_ = 0;
+  int steps_ = 0;
+  int still_steps_ = 0;
+  double scale_ = 0;
+  double still_since_ = 0;  // fitness of the global best when it last moved
+  std::vector<models::Position> positions_, velocities_, own_best_;
+  std::vector<double> fitness_, own_fitness_;
+  std::deque<GlobalBest> list_;
+};
+
+}  // namespace swarmfit::swarm
