@@ -68,7 +68,8 @@ TEST(Depth, ColoursInOrder) {
 TEST(Depth, Faults) {
   const TemporaryFolder folder;
   const auto depth = depth_image(folder);
-  expect_error(read_rgbd(colour_image(folder, "c.png", 5, 3), depth, kCamera, 0.001), Error::Kind::bad_input, "5 x 3 pixels, must be 4 x 3");
+  expect_error(read_rgbd(colour_image(folder, "c.png", 5, 3), depth, kCamera, 0.001), Error::Kind::bad_input,
+               "5 x 3 pixels, must be 4 x 3");
   expect_error(read_depth(folder / "c.png", kCamera, 0.001), Error::Kind::bad_input, "8 bits and 3 channels");
   expect_error(read_depth(folder / "none.png", kCamera, 0.001), Error::Kind::bad_input, "none.png");
   expect_error(read_depth(folder.put("text.png", "hello"), kCamera, 0.001), Error::Kind::bad_input, "not a PNG");
@@ -93,7 +94,8 @@ TEST(Depth, AnImageCutShortOrDamagedIsAnError) {
     EXPECT_FALSE(read_depth(folder.put("damaged.png", damaged), kCamera, 0.001)) << i;
   }
   const std::string jpeg = tests::contents(colour_image(folder, "c.jpg", 40, 30));
-  expect_error(read_rgbd(folder.put("cut.jpg", jpeg.substr(0, jpeg.size() / 2)), folder / "depth.png", kCamera, 0.001), Error::Kind::bad_input, "cut short");
+  expect_error(read_rgbd(folder.put("cut.jpg", jpeg.substr(0, jpeg.size() / 2)), folder / "depth.png", kCamera, 0.001),
+               Error::Kind::bad_input, "cut short");
 }
 
 const char* const kCalib =
@@ -139,8 +141,8 @@ TEST(Stereo, SizesMustAgree) {
   const std::string calib = "cam0=[100 0 40; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=100\nndisp=16\n";
   expect_error(read_stereo(left, right, folder.put("calib.txt", calib)), Error::Kind::bad_input, "80 x 41");
   expect_error(read_stereo(left, left, folder.put("calib.txt", calib + "width=79\n")), Error::Kind::bad_input, "79");
-  expect_error(read_stereo(left, left, folder.put("calib.txt", "cam0=[100 0 40; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=100\nndisp=100\n")), Error::Kind::bad_input,
-               "ndisp: 100");
+  expect_error(read_stereo(left, left, folder.put("calib.txt", "cam0=[100 0 40; 0 100 20; 0 0 1]\ndoffs=0\nbaseline=100\nndisp=100\n")),
+               Error::Kind::bad_input, "ndisp: 100");
 }
 
 }  // namespace

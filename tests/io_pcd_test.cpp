@@ -18,16 +18,17 @@ namespace {
 using tests::raw;
 using tests::TemporaryFolder;
 
-std::string header(const std::string& fields, const std::string& sizes, const std::string& types, const std::string& counts, std::size_t width,
-                   std::size_t height, const std::string& data) {
-  return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS " + fields + "\nSIZE " + sizes + "\nTYPE " + types + "\nCOUNT " + counts +
-         "\nWIDTH " + std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS " +
+std::string header(const std::string& fields, const std::string& sizes, const std::string& types, const std::string& counts,
+                   std::size_t width, std::size_t height, const std::string& data) {
+  return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS " + fields + "\nSIZE " + sizes + "\nTYPE " + types + "\nCOUNT " +
+         counts + "\nWIDTH " + std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS " +
          std::to_string(width * height) + "\nDATA " + data + "\n";
 }
 
 std::string compressed(const std::string& columns) {
   std::string packed(2 * columns.size() + 64, '\0');
-  const auto size = lzf_compress(columns.data(), static_cast<unsigned>(columns.size()), packed.data(), static_cast<unsigned>(packed.size()));
+  const auto size =
+      lzf_compress(columns.data(), static_cast<unsigned>(columns.size()), packed.data(), static_cast<unsigned>(packed.size()));
   EXPECT_GT(size, 0U);
   return raw(static_cast<std::uint32_t>(size)) + raw(static_cast<std::uint32_t>(columns.size())) + packed.substr(0, size);
 }
@@ -42,10 +43,10 @@ std::string complaint(const std::filesystem::path& file) {
   return cloud.error().message;
 }
 
-#define EXPECT_COMPLAINT(file, what)                                       \
-  do {                                                                     \
-    const std::string message = complaint(file);                           \
-    EXPECT_NE(message.find(what), std::string::npos) << message;           \
+#define EXPECT_COMPLAINT(file, what)                             \
+  do {                                                           \
+    const std::string message = complaint(file);                 \
+    EXPECT_NE(message.find(what), std::string::npos) << message; \
   } while (false)
 
 TEST(Pcd, AsciiKeepsEveryDigitAndStepsOverOtherFields) {
@@ -82,7 +83,8 @@ TEST(Pcd, BinaryFloatStaysFloat) {
   for (int i = 0; i < 6; ++i) {
     data += raw(static_cast<std::uint8_t>(7)) + raw(0.1F * static_cast<float>(i)) + raw(2.0F) + raw(3.0F) + raw(std::uint32_t{0xff010203});
   }
-  const auto cloud = read_cloud(folder.put("b.PCD", header("tag x y z rgba", "1 4 4 4 4", "U F F F U", "1 1 1 1 1", 3, 2, "binary") + data));
+  const auto cloud =
+      read_cloud(folder.put("b.PCD", header("tag x y z rgba", "1 4 4 4 4", "U F F F U", "1 1 1 1 1", 3, 2, "binary") + data));
   ASSERT_TRUE(cloud) << cloud.error().message;
   EXPECT_TRUE(cloud->values64.empty());
   ASSERT_EQ(cloud->size(), 6U);
@@ -104,7 +106,10 @@ TEST(Pcd, BinaryOfEverySizeAndType) {
     const bool narrow = cloud->values64.empty();
     for (int d = 0; d < 3; ++d) {
       const auto k = static_cast<std::size_t>(d);
-      EXPECT_EQ(narrow ? static_cast<double>(cloud->values32[k]) : cloud->values64[k], static_cast<double>(d == 0 ? x : d == 1 ? y : z)) << type << size;
+      EXPECT_EQ(narrow ? static_cast<double>(cloud->values32[k]) : cloud->values64[k], static_cast<double>(d == 0   ? x
+                                                                                                           : d == 1 ? y
+                                                                                                                    : z))
+          << type << size;
     }
   };
   check("1", "I", std::int8_t{-5}, std::int8_t{6}, std::int8_t{7});
@@ -128,8 +133,8 @@ TEST(Pcd, CompressedHoldsFieldAfterField) {
     for (std::size_t i = 0; i < kPoints; ++i) columns += raw(static_cast<float>(i) + 0.25F * static_cast<float>(axis));
   }
   for (std::size_t i = 0; i < kPoints; ++i) columns += raw(std::bit_cast<float>(std::uint32_t{0x102030}));
-  const auto cloud = read_cloud(
-      folder.put("c.pcd", header("w z y x rgb", "4 4 4 4 4", "F F F F F", "2 1 1 1 1", kPoints, 1, "binary_compressed") + compressed(columns)));
+  const auto cloud = read_cloud(folder.put(
+      "c.pcd", header("w z y x rgb", "4 4 4 4 4", "F F F F F", "2 1 1 1 1", kPoints, 1, "binary_compressed") + compressed(columns)));
   ASSERT_TRUE(cloud) << cloud.error().message;
   ASSERT_EQ(cloud->size(), kPoints);
   EXPECT_EQ(cloud->values32[3 * 4321 + 0], 4321.5F);
@@ -142,7 +147,9 @@ TEST(Pcd, CompressedHoldsFieldAfterField) {
 TEST(Pcd, LyingCountsAreNamed) {
   const TemporaryFolder folder;
   const std::string point = raw(1.0F) + raw(2.0F) + raw(3.0F);
-  const auto xyz = [&](std::size_t width, std::size_t height, const char* data) { return header("x y z", "4 4 4", "F F F", "1 1 1", width, height, data); };
+  const auto xyz = [&](std::size_t width, std::size_t height, const char* data) {
+    return header("x y z", "4 4 4", "F F F", "1 1 1", width, height, data);
+  };
   EXPECT_COMPLAINT(folder.put("more.pcd", xyz(3, 1, "binary") + point + point), "POINTS 3");
   EXPECT_COMPLAINT(folder.put("fewer.pcd", xyz(1, 1, "binary") + point + point), "POINTS 1");
   EXPECT_COMPLAINT(folder.put("ascii-more.pcd", xyz(3, 1, "ascii") + "1 2 3\n4 5 6                          \n"), "ends after 2 points");
@@ -160,7 +167,8 @@ TEST(Pcd, LyingCountsAreNamed) {
     EXPECT_COMPLAINT(folder.put("width.pcd", bad), count);
   }
   EXPECT_COMPLAINT(folder.put("zero.pcd", xyz(0, 1, "binary")), "WIDTH 0");
-  EXPECT_COMPLAINT(folder.put("count.pcd", header("x y z w", "4 4 4 8", "F F F F", "1 1 1 4294967295", 4000000, 1, "binary") + point), "POINTS 4000000");
+  EXPECT_COMPLAINT(folder.put("count.pcd", header("x y z w", "4 4 4 8", "F F F F", "1 1 1 4294967295", 4000000, 1, "binary") + point),
+                   "POINTS 4000000");
   EXPECT_COMPLAINT(folder.put("count0.pcd", header("x y z w", "4 4 4 8", "F F F F", "1 1 1 0", 1, 1, "binary") + point), "COUNT 0");
   EXPECT_COMPLAINT(folder.put("xcount.pcd", header("x y z", "4 4 4", "F F F", "2 1 1", 1, 1, "binary") + point + raw(1.0F)), "COUNT 2");
 }
@@ -181,9 +189,11 @@ TEST(Pcd, DamagedCompressedData) {
   const TemporaryFolder folder;
   const std::string head = header("x y z", "4 4 4", "F F F", "1 1 1", 4, 1, "binary_compressed");
   const std::string good = compressed(std::string(48, 'a'));
-  EXPECT_COMPLAINT(folder.put("sizes.pcd", head + raw(std::uint32_t{4}) + raw(std::uint32_t{4000000000U}) + "abcd"), "must be POINTS x 12 = 48");
+  EXPECT_COMPLAINT(folder.put("sizes.pcd", head + raw(std::uint32_t{4}) + raw(std::uint32_t{4000000000U}) + "abcd"),
+                   "must be POINTS x 12 = 48");
   EXPECT_COMPLAINT(folder.put("long.pcd", head + raw(std::uint32_t{4000}) + raw(std::uint32_t{48}) + "abcd"), "4000");
-  EXPECT_COMPLAINT(folder.put("noise.pcd", head + raw(std::uint32_t{8}) + raw(std::uint32_t{48}) + "\xff\xff\xff\xff\xff\xff\xff\xff"), "damaged");
+  EXPECT_COMPLAINT(folder.put("noise.pcd", head + raw(std::uint32_t{8}) + raw(std::uint32_t{48}) + "\xff\xff\xff\xff\xff\xff\xff\xff"),
+                   "damaged");
 }
 
 TEST(Pcd, HeaderFaults) {

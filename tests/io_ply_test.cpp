@@ -24,11 +24,12 @@ std::string complaint(const std::filesystem::path& file) {
 
 TEST(Ply, AsciiWithListsCommentsAndFaces) {
   const TemporaryFolder folder;
-  const auto cloud = read_cloud(folder.put("a.ply",
-                                           "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nobj_info none\r\nelement camera 1\nproperty list uchar float view\n"
-                                           "element vertex 2\nproperty list uchar int seen\nproperty double y\nproperty double x\nproperty float z\n"
-                                           "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\n"
-                                           "end_header\n2 0.5 0.5\n3 7 8 9 5400000.0625 500000.5 1 10 20 30\n0 2 1 nan 40 50 60\n2 0 1\n"));
+  const auto cloud = read_cloud(
+      folder.put("a.ply",
+                 "ply\r\nformat ascii 1.0\r\ncomment made by hand\r\nobj_info none\r\nelement camera 1\nproperty list uchar float view\n"
+                 "element vertex 2\nproperty list uchar int seen\nproperty double y\nproperty double x\nproperty float z\n"
+                 "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\n"
+                 "end_header\n2 0.5 0.5\n3 7 8 9 5400000.0625 500000.5 1 10 20 30\n0 2 1 nan 40 50 60\n2 0 1\n"));
   ASSERT_TRUE(cloud) << cloud.error().message;
   ASSERT_EQ(cloud->size(), 2U);
   EXPECT_EQ(cloud->values64[0], 500000.5);
@@ -43,8 +44,10 @@ TEST_P(PlyBinary, FloatsStayFloatsInEitherOrderOfBytes) {
   const bool big = GetParam();
   const TemporaryFolder folder;
   std::string text = std::string("ply\nformat ") + (big ? "binary_big_endian" : "binary_little_endian") +
-                     " 1.0\nelement before 2\nproperty list ushort short values\nelement vertex 300\nproperty ushort tag\nproperty float x\nproperty float y\n"
-                     "property float z\nproperty uchar blue\nproperty uchar green\nproperty uchar red\nelement face 1\nproperty list uchar int32 vertex_indices\nend_header\n";
+                     " 1.0\nelement before 2\nproperty list ushort short values\nelement vertex 300\nproperty ushort tag\nproperty float "
+                     "x\nproperty float y\n"
+                     "property float z\nproperty uchar blue\nproperty uchar green\nproperty uchar red\nelement face 1\nproperty list uchar "
+                     "int32 vertex_indices\nend_header\n";
   text += raw(std::uint16_t{3}, big) + std::string(6, 'l') + raw(std::uint16_t{0}, big);
   for (int i = 0; i < 300; ++i) {
     const auto f = static_cast<float>(i);
@@ -68,8 +71,9 @@ TEST_P(PlyBinary, FloatsStayFloatsInEitherOrderOfBytes) {
 TEST_P(PlyBinary, DoublesAndAListWithinTheVertex) {
   const bool big = GetParam();
   const TemporaryFolder folder;
-  std::string text = std::string("ply\nformat ") + (big ? "binary_big_endian" : "binary_little_endian") +
-                     " 1.0\nelement vertex 2\nproperty double x\nproperty list uchar double extra\nproperty double y\nproperty int z\nend_header\n";
+  std::string text =
+      std::string("ply\nformat ") + (big ? "binary_big_endian" : "binary_little_endian") +
+      " 1.0\nelement vertex 2\nproperty double x\nproperty list uchar double extra\nproperty double y\nproperty int z\nend_header\n";
   text += raw(500000.0625, big) + raw(std::uint8_t{2}) + raw(1.0, big) + raw(2.0, big) + raw(5400000.5, big) + raw(std::int32_t{-3}, big);
   text += raw(7.0, big) + raw(std::uint8_t{0}) + raw(8.0, big) + raw(std::int32_t{9}, big);
   const auto whole = read_cloud(folder.put("l.ply", text));

@@ -9,10 +9,10 @@
 namespace swarmfit::io {
 
 struct StereoCalibration {
-  Intrinsics left;      ///< cam0
-  double doffs = 0;     ///< cx of the right camera less cx of the left [px]
-  double baseline = 0;  ///< [m]; the file has mm
-  int disparities = 0;  ///< ndisp: every disparity is below it [px]
+  Intrinsics left;            ///< cam0
+  double doffs = 0;           ///< cx of the right camera less cx of the left [px]
+  double baseline = 0;        ///< [m]; the file has mm
+  int disparities = 0;        ///< ndisp: every disparity is below it [px]
   int width = 0, height = 0;  ///< 0 where the file does not say
 };
 

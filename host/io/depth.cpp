@@ -84,14 +84,16 @@ Expected<Cloud> read_depth(const std::filesystem::path& depth, const Intrinsics&
   return io::guarded(depth, Error::Kind::bad_input, [&] { return io::depth_cloud(depth, intrinsics, depth_scale); });
 }
 
-Expected<Cloud> read_rgbd(const std::filesystem::path& color, const std::filesystem::path& depth, const Intrinsics& intrinsics, double depth_scale) {
+Expected<Cloud> read_rgbd(const std::filesystem::path& color, const std::filesystem::path& depth, const Intrinsics& intrinsics,
+                          double depth_scale) {
   return io::guarded(color, Error::Kind::bad_input, [&]() -> Expected<Cloud> {
     auto cloud = read_depth(depth, intrinsics, depth_scale);
     if (!cloud) return cloud;
     const auto image = io::read_colour_image(color);
     if (!image) return tl::unexpected(image.error());
     if (image->cols != cloud->width || image->rows != cloud->height) {
-      return io::bad_input(color, "is {} x {} pixels, must be {} x {} as {}", image->cols, image->rows, cloud->width, cloud->height, depth.string());
+      return io::bad_input(color, "is {} x {} pixels, must be {} x {} as {}", image->cols, image->rows, cloud->width, cloud->height,
+                           depth.string());
     }
     io::take_colours(*image, *cloud);
     return cloud;

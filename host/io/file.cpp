@@ -70,8 +70,7 @@ Expected<FileBytes> read_file(const std::filesystem::path& file) {
 PendingFile::PendingFile(std::filesystem::path file, std::filesystem::path temporary)
     : file_(std::move(file)), temporary_(std::move(temporary)) {}
 
-PendingFile::PendingFile(PendingFile&& other) noexcept
-    : file_(std::move(other.file_)), temporary_(std::exchange(other.temporary_, {})) {}
+PendingFile::PendingFile(PendingFile&& other) noexcept : file_(std::move(other.file_)), temporary_(std::exchange(other.temporary_, {})) {}
 
 PendingFile::~PendingFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());

@@ -62,8 +62,10 @@ Expected<cv::Size> check_png(const std::filesystem::path& file, std::string_view
     if (rest.size() < 12) return bad_input(file, "PNG ends before its last chunk");
     const std::uint32_t length = big_endian(rest);
     const std::string_view name = rest.substr(4, 4);
-    if (length > rest.size() - 12) return bad_input(file, "PNG is cut short: chunk {} has {} bytes, but only {} follow", excerpt(name), length, rest.size() - 12);
-    if (crc(rest.substr(4, length + 4)) != big_endian(rest.substr(8 + length))) return bad_input(file, "PNG is damaged: checksum of chunk {}", excerpt(name));
+    if (length > rest.size() - 12)
+      return bad_input(file, "PNG is cut short: chunk {} has {} bytes, but only {} follow", excerpt(name), length, rest.size() - 12);
+    if (crc(rest.substr(4, length + 4)) != big_endian(rest.substr(8 + length)))
+      return bad_input(file, "PNG is damaged: checksum of chunk {}", excerpt(name));
     if (!size) {
       if (name != "IHDR" || length != 13) return bad_input(file, "PNG does not start with IHDR");
       const std::uint64_t width = big_endian(rest.substr(8)), height = big_endian(rest.substr(12));
@@ -85,11 +87,13 @@ Expected<cv::Mat> decode(const std::filesystem::path& file, int flags, bool jpeg
   if (text.starts_with(kPng)) {
     if (auto size = check_png(file, text); !size) return tl::unexpected(size.error());
   } else if (jpeg_too && text.starts_with(kJpeg)) {
-    if (text.find("\xff\xd9", text.size() > 4096 ? text.size() - 4096 : 0) == std::string_view::npos) return bad_input(file, "JPEG is cut short");
+    if (text.find("\xff\xd9", text.size() > 4096 ? text.size() - 4096 : 0) == std::string_view::npos)
+      return bad_input(file, "JPEG is cut short");
   } else {
     return bad_input(file, "is not a {} image", jpeg_too ? "PNG or JPEG" : "PNG");
   }
-  if (bytes->size() > std::size_t{std::numeric_limits<int>::max()}) return bad_input(file, "has {} bytes, too many for an image", bytes->size());
+  if (bytes->size() > std::size_t{std::numeric_limits<int>::max()})
+    return bad_input(file, "has {} bytes, too many for an image", bytes->size());
   const cv::Mat encoded(1, static_cast<int>(bytes->size()), CV_8U, const_cast<char*>(bytes->data()));
   cv::Mat image = cv::imdecode(encoded, flags);
   if (image.empty()) return bad_input(file, "cannot be decoded as an image");
@@ -105,7 +109,8 @@ Expected<cv::Mat> read_colour_image(const std::filesystem::path& file) {
 Expected<cv::Mat> read_depth_image(const std::filesystem::path& file) {
   auto image = decode(file, cv::IMREAD_UNCHANGED, false);
   if (image && image->type() != CV_16UC1) {
-    return bad_input(file, "is an image of {} bits and {} channels, a depth image must have 16 bits and 1 channel", 8 * image->elemSize1(), image->channels());
+    return bad_input(file, "is an image of {} bits and {} channels, a depth image must have 16 bits and 1 channel", 8 * image->elemSize1(),
+                     image->channels());
   }
   return image;
 }

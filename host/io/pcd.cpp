@@ -21,8 +21,8 @@ static_assert(std::endian::native == std::endian::little, "PCD's binary data is 
 /// The fields that make a cloud.
 struct Wanted {
   std::array<const PcdField*, 3> xyz{};
-  const PcdField* packed = nullptr;               ///< rgb or rgba
-  std::array<const PcdField*, 3> channels{};      ///< r, g, b; all or none
+  const PcdField* packed = nullptr;           ///< rgb or rgba
+  std::array<const PcdField*, 3> channels{};  ///< r, g, b; all or none
   bool coloured() const noexcept { return packed || channels[0]; }
 };
 
@@ -74,13 +74,15 @@ void gather_fields(const PcdHeader& header, const Wanted& wanted, const char* da
   gather(xyz, colour, header.points, cloud);
 }
 
-Expected<> read_binary(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted, Cloud& cloud) {
+Expected<> read_binary(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted,
+                       Cloud& cloud) {
   if (auto ok = check_surplus(file, payload.substr(header.points * header.point_bytes), header.points); !ok) return ok;
   gather_fields(header, wanted, payload.data(), false, cloud);
   return {};
 }
 
-Expected<> read_compressed(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted, Cloud& cloud) {
+Expected<> read_compressed(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted,
+                           Cloud& cloud) {
   std::array<std::uint32_t, 2> sizes{};  // compressed, uncompressed
   if (payload.size() < sizeof sizes) return bad_input(file, "ends before the sizes of the compressed data");
   std::memcpy(sizes.data(), payload.data(), sizeof sizes);
@@ -89,7 +91,8 @@ Expected<> read_compressed(const std::filesystem::path& file, std::string_view p
   if (sizes[1] != need) {
     return bad_input(file, "compressed data says it holds {} bytes, must be POINTS x {} = {}", sizes[1], header.point_bytes, need);
   }
-  if (sizes[0] > payload.size()) return bad_input(file, "compressed data says it takes {} bytes, but only {} follow", sizes[0], payload.size());
+  if (sizes[0] > payload.size())
+    return bad_input(file, "compressed data says it takes {} bytes, but only {} follow", sizes[0], payload.size());
   if (auto ok = check_surplus(file, payload.substr(sizes[0]), header.points); !ok) return ok;
 
   const auto data = std::make_unique_for_overwrite<char[]>(need);
@@ -146,12 +149,14 @@ bool take(const Role& role, std::string_view token, std::size_t point, Cloud& cl
   return false;
 }
 
-Expected<> read_ascii(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted, Cloud& cloud) {
+Expected<> read_ascii(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted,
+                      Cloud& cloud) {
   std::uint64_t tokens = 0;
   for (const auto& field : header.fields) tokens += field.count;
   // A value and what parts it from the next take two bytes at the least.
   if (tokens > payload.size() || header.points > (payload.size() + 1) / (2 * tokens)) {
-    return bad_input(file, "POINTS {} of {} values each, but only {} bytes of data follow the header", header.points, tokens, payload.size());
+    return bad_input(file, "POINTS {} of {} values each, but only {} bytes of data follow the header", header.points, tokens,
+                     payload.size());
   }
   const std::vector<Role> row = roles(header, wanted);
   cloud.values64.resize(3 * header.points);

@@ -45,7 +45,8 @@ Expected<std::uint64_t> whole_number(const std::filesystem::path& file, std::str
   std::uint64_t value = 0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
   if (error == std::errc::result_out_of_range) return bad_input(file, "{} {} is too large", key, excerpt(token));
-  if (error != std::errc() || end != token.data() + token.size()) return bad_input(file, "{} {} must be a whole number >= 0", key, excerpt(token));
+  if (error != std::errc() || end != token.data() + token.size())
+    return bad_input(file, "{} {} must be a whole number >= 0", key, excerpt(token));
   return value;
 }
 
@@ -98,7 +99,8 @@ Expected<> read_fields(const std::filesystem::path& file, const Entries& entries
       if (!count) return tl::unexpected(count.error());
       // No point is larger than the largest file there can be.
       if (*count < 1 || *count > std::numeric_limits<std::uint32_t>::max()) {
-        return bad_input(file, "field {}: COUNT {}, must be in 1..{}", excerpt(field.name), *count, std::numeric_limits<std::uint32_t>::max());
+        return bad_input(file, "field {}: COUNT {}, must be in 1..{}", excerpt(field.name), *count,
+                         std::numeric_limits<std::uint32_t>::max());
       }
       field.count = *count;
     }
@@ -139,10 +141,13 @@ Expected<> read_data(const std::filesystem::path& file, const Entries& entries, 
     return bad_input(file, "DATA {}, must be ascii, binary or binary_compressed", excerpt(data));
   }
   // LZF's longest match is 264 bytes out of 3; ascii spends two bytes a value, but for the last.
-  const std::uint64_t most = header.data == PcdHeader::Data::binary_compressed ? std::uint64_t{payload} * 88 : std::uint64_t{payload} * 4 + 8;
+  const std::uint64_t most =
+      header.data == PcdHeader::Data::binary_compressed ? std::uint64_t{payload} * 88 : std::uint64_t{payload} * 4 + 8;
   std::uint64_t need = 0;
-  if (__builtin_mul_overflow(header.points, header.point_bytes, &need) || (header.data == PcdHeader::Data::binary ? need > payload : need > most)) {
-    return bad_input(file, "POINTS {} of {} bytes each, but only {} bytes of {} data follow the header", header.points, header.point_bytes, payload, data);
+  if (__builtin_mul_overflow(header.points, header.point_bytes, &need) ||
+      (header.data == PcdHeader::Data::binary ? need > payload : need > most)) {
+    return bad_input(file, "POINTS {} of {} bytes each, but only {} bytes of {} data follow the header", header.points, header.point_bytes,
+                     payload, data);
   }
   return {};
 }

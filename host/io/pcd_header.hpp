@@ -18,8 +18,8 @@ namespace swarmfit::io {
 struct PcdField {
   std::string name;
   Scalar type = Scalar::f32;
-  std::uint64_t count = 1;  ///< values a point
-  std::uint64_t offset = 0; ///< bytes from the start of a point, uncompressed
+  std::uint64_t count = 1;   ///< values a point
+  std::uint64_t offset = 0;  ///< bytes from the start of a point, uncompressed
   std::uint64_t bytes() const noexcept { return size_of(type) * count; }
 };
 
@@ -29,7 +29,7 @@ struct PcdHeader {
   std::uint64_t width = 0, height = 1, points = 0;
   std::uint64_t point_bytes = 0;  ///< of all fields together
   Data data = Data::ascii;
-  std::size_t size = 0;   ///< bytes of the header
+  std::size_t size = 0;  ///< bytes of the header
   std::size_t lines = 0;
 
   /// Nothing where there is no such field.

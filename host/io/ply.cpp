@@ -122,7 +122,8 @@ Expected<> read_binary(const std::filesystem::path& file, std::string_view paylo
   for (std::size_t e = 0; e < header.elements.size(); ++e) {
     const PlyElement& element = header.elements[e];
     const char* next = step_over_all(element, at, end, swapped);
-    if (!next) return bad_input(file, "element {} counts {} items, but the data ends before the last", excerpt(element.name), element.count);
+    if (!next)
+      return bad_input(file, "element {} counts {} items, but the data ends before the last", excerpt(element.name), element.count);
     if (e == vertex_index) {
       if (element.has_lists()) {
         const std::string_view items(at, static_cast<std::size_t>(next - at));
@@ -153,12 +154,15 @@ Expected<> read_ascii_vertex(const std::filesystem::path& file, TextCursor& curs
       std::uint64_t length = 0;
       good = parse_number(token, length);
       for (std::uint64_t i = 0; good && i < length; ++i) {
-        if (cursor.token().empty()) return bad_input(file, "line {}: list {} is shorter than its length {}", cursor.line_number(), excerpt(property.name), length);
+        if (cursor.token().empty())
+          return bad_input(file, "line {}: list {} is shorter than its length {}", cursor.line_number(), excerpt(property.name), length);
       }
     } else if (slots[p] >= 0) {
       good = parse_number(token, value);
     }
-    if (!good) return bad_input(file, "line {}, property {}: {} is not a number in range", cursor.line_number(), excerpt(property.name), excerpt(token));
+    if (!good)
+      return bad_input(file, "line {}, property {}: {} is not a number in range", cursor.line_number(), excerpt(property.name),
+                       excerpt(token));
     const auto slot = static_cast<std::size_t>(slots[p]);
     if (slots[p] >= 3) {
       cloud.rgb[3 * point + slot - 3] = channel(value, property.type);
@@ -166,7 +170,8 @@ Expected<> read_ascii_vertex(const std::filesystem::path& file, TextCursor& curs
       cloud.values64[3 * point + slot] = value;
     }
   }
-  if (!cursor.token().empty()) return bad_input(file, "line {}: more values than the {} properties of 'vertex'", cursor.line_number(), vertex.properties.size());
+  if (!cursor.token().empty())
+    return bad_input(file, "line {}: more values than the {} properties of 'vertex'", cursor.line_number(), vertex.properties.size());
   return {};
 }
 
@@ -185,12 +190,14 @@ Expected<> read_ascii(const std::filesystem::path& file, std::string_view payloa
   for (std::size_t e = 0; e < header.elements.size(); ++e) {
     const PlyElement& element = header.elements[e];
     for (std::uint64_t i = 0; i < element.count; ++i) {
-      if (!cursor.next_line()) return bad_input(file, "element {} counts {} items, but the data ends after {}", excerpt(element.name), element.count, i);
+      if (!cursor.next_line())
+        return bad_input(file, "element {} counts {} items, but the data ends after {}", excerpt(element.name), element.count, i);
       if (e != vertex_index) continue;
       if (auto ok = read_ascii_vertex(file, cursor, vertex, slots, i, cloud); !ok) return ok;
     }
   }
-  if (cursor.next_line()) return bad_input(file, "line {} follows the last element; the header's counts do not match the data", cursor.line_number());
+  if (cursor.next_line())
+    return bad_input(file, "line {} follows the last element; the header's counts do not match the data", cursor.line_number());
   return {};
 }
 

@@ -34,7 +34,8 @@ cv::Mat disparity_map(const cv::Mat& left, const cv::Mat& right, int disparities
 
 namespace {
 
-Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::filesystem::path& right_file, const std::filesystem::path& calib_file) {
+Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::filesystem::path& right_file,
+                             const std::filesystem::path& calib_file) {
   const auto calib = read_calibration(calib_file);
   if (!calib) return tl::unexpected(calib.error());
   const auto left = read_colour_image(left_file);
@@ -42,10 +43,12 @@ Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::
   const auto right = read_colour_image(right_file);
   if (!right) return tl::unexpected(right.error());
   if (right->size() != left->size()) {
-    return bad_input(right_file, "is {} x {} pixels, must be {} x {} as {}", right->cols, right->rows, left->cols, left->rows, left_file.string());
+    return bad_input(right_file, "is {} x {} pixels, must be {} x {} as {}", right->cols, right->rows, left->cols, left->rows,
+                     left_file.string());
   }
   if ((calib->width && calib->width != left->cols) || (calib->height && calib->height != left->rows)) {
-    return bad_input(left_file, "is {} x {} pixels, must be {} x {} as {} says", left->cols, left->rows, calib->width, calib->height, calib_file.string());
+    return bad_input(left_file, "is {} x {} pixels, must be {} x {} as {} says", left->cols, left->rows, calib->width, calib->height,
+                     calib_file.string());
   }
   if (calib->disparities > left->cols) {
     return bad_input(calib_file, "field ndisp: {}, must be at most the image's width {}", calib->disparities, left->cols);

@@ -72,7 +72,8 @@ Expected<CsvColumns> named_columns(const std::filesystem::path& file, const std:
       matched += at != layout.end();
       ignored += name == "label";
     }
-    const bool each_once = std::all_of(layout.begin(), layout.end(), [&](auto name) { return std::count(lower.begin(), lower.end(), name) == 1; });
+    const bool each_once =
+        std::all_of(layout.begin(), layout.end(), [&](auto name) { return std::count(lower.begin(), lower.end(), name) == 1; });
     if (each_once && matched + ignored == lower.size()) return columns;
   }
   std::string given;
@@ -161,7 +162,8 @@ Expected<Cloud> read_csv(const std::filesystem::path& file, const FileBytes& byt
   cloud.dimension = columns->dimension;
   bool more = columns->header ? cursor.next_line() : true;
   for (; more; more = cursor.next_line()) {
-    if (auto ok = read_csv_row(file, cursor.line_number(), cursor.rest_of_line(), *columns, cloud.values64); !ok) return tl::unexpected(ok.error());
+    if (auto ok = read_csv_row(file, cursor.line_number(), cursor.rest_of_line(), *columns, cloud.values64); !ok)
+      return tl::unexpected(ok.error());
   }
   if (auto ok = finish(file, cloud); !ok) return tl::unexpected(ok.error());
   return cloud;
