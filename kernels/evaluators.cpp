@@ -51,11 +51,11 @@ Result<Selection> make_evaluator(std::string_view name, const EvaluatorOptions& 
   if (name == "vulkan") return selected(make_vulkan_evaluator(options, ""), "asked for by name");
   std::string known = "auto, cpu, vulkan, reference";
   for (const DeviceDescription& device : list_devices()) {
-    if (device.backend != "reference" && contains_ignoring_case(device.device, name)) {
+    if (device.backend != "reference" && device.kind != "none" && contains_ignoring_case(device.device, name)) {
       return selected(device.backend == "cpu" ? make_cpu_evaluator(options) : make_vulkan_evaluator(options, device.device),
                       "asked for by device name");
     }
-    if (device.backend == "vulkan") known += ", " + device.device;
+    if (device.backend == "vulkan" && device.kind != "none") known += ", " + device.device;
   }
   return fail(Failure::Kind::unavailable, fmt::format("backend is '{}', must be one of: {}", name, known));
 }
