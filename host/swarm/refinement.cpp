@@ -8,6 +8,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr int kRounds = 8;
+constexpr float kCorner = 0.1F;            // of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
 
 Expected<> measure(const Ground& ground, const models::Position& theta, std::vector<float>& distances) {
@@ -18,10 +19,20 @@ Expected<> measure(const Ground& ground, const models::Position& theta, std::vec
   return {};
 }
 
+/// Weights that turn least squares into least absolute deviations, which is what the truncated L1 loss asks of the points within tau.
+void weights(const Ground& ground, std::span<const std::uint32_t> index, std::span<const float> distances, std::vector<double>& weight) {
+  weight.resize(index.size());
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    const float d = distances[index[k]], tau = ground.tau[index[k]];
+    weight[k] = 1.0 / static_cast<double>(std::max(d / tau, kCorner));
+  }
+}
+
 /// Distances of every model; nearest model of each point (models.size() if none within tau) and the joint energy.
-Expected<double> nearest(const Ground& ground, const std::vector<models::Position>& models, std::vector<std::size_t>& owner) {
+Expected<double> nearest(const Ground& ground, const std::vector<models::Position>& models, std::vector<std::size_t>& owner,
+                         std::vector<float>& least) {
   std::vector<float> distances;
-  std::vector<float> least(ground.tau.begin(), ground.tau.end());
+  least.assign(ground.tau.begin(), ground.tau.end());
   owner.assign(ground.points.size(), models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
@@ -50,7 +61,7 @@ Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<cons
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (distances[i] <= ground.tau[i] && distances[i] <= caps[i]) index.push_back(static_cast<std::uint32_t>(i));
     }
-    weight.assign(index.size(), 1.0);
+    weights(ground, index, distances, weight);
     models::Position candidate = theta;
     if (!ground.space.refine(ground.points, {index, weight}, candidate)) return {};
     auto cost = landscape.loss(candidate);
@@ -65,8 +76,10 @@ Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<cons
 }
 
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models) {
-  std::vector<std::size_t> owner;
-  auto energy = nearest(ground, models, owner);
+  std::vector<std::size_t> owner, next;
+  std::vector<float> least, next_least;
+  std::vector<double> weight;
+  auto energy = nearest(ground, models, owner, least);
   if (!energy) return energy;
   for (int round = 0; round < kRounds; ++round) {
     std::vector<models::Position> candidates = models;
@@ -75,16 +88,16 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Positi
       for (std::size_t i = 0; i < owner.size(); ++i) {
         if (owner[i] == m) index.push_back(static_cast<std::uint32_t>(i));
       }
-      const std::vector<double> weight(index.size(), 1.0);
+      weights(ground, index, least, weight);
       if (!ground.space.refine(ground.points, {index, weight}, candidates[m])) candidates[m] = models[m];
     }
-    std::vector<std::size_t> next;
-    auto candidate_energy = nearest(ground, candidates, next);
+    auto candidate_energy = nearest(ground, candidates, next, next_least);
     if (!candidate_energy) return candidate_energy;
     if (!(*candidate_energy < *energy)) break;
     const bool worthwhile = *energy - *candidate_energy > kWorthwhile * *energy;
     models = std::move(candidates);
-    owner = std::move(next);
+    owner.swap(next);
+    least.swap(next_least);
     energy = candidate_energy;
     if (!worthwhile) break;
   }
