@@ -1,0 +1,55 @@
+// The points on the device: finite ones only, centred, column after column, in segments no larger than a binding may be.
+#pragma once
+
+#include <vector>
+
+#include "kernels/checks.hpp"
+#include "kernels/vulkan/buffer.hpp"
+#include "kernels/vulkan/tile_shape.hpp"
+
+namespace swarmfit::kernels::vulkan {
+
+struct Segment {
+  std::size_t first = 0;     ///< of the finite points
+  std::uint32_t count = 0;   ///< finite points
+  std::uint32_t stride = 0;  ///< points in a column: count, padded to whole chunks with points of cap 0
+  std::uint32_t chunks = 0;
+  Buffer points;
+  Buffer caps;
+  Buffer partials;   ///< [particle][chunk]
+  Buffer tolerance;  ///< like caps; made when assign first needs it
+  Buffer output;     ///< distances or labels; made when first needed
+};
+
+class Cloud {
+ public:
+  explicit Cloud(const Device& device) : device_(device) {}
+
+  /// Copies the points, and sets all caps to 0. Buffers that are large enough are kept. Throws std::exception.
+  /// Fails with `invalid` where a single chunk does not fit the device's storage range.
+  Result<> set(const PointsView& points, Extent extent);
+  /// `values` in input order.
+  void write_caps(std::span<const float> values);
+  void write_tolerance(std::span<const float> values);
+
+  const Extent& extent() const noexcept { return extent_; }
+  const ChunkShape& shape() const noexcept { return shape_; }
+  std::vector<Segment>& segments() noexcept { return segments_; }
+  /// The row in the input of a finite point.
+  std::size_t row(std::size_t finite_point) const noexcept { return rows_.empty() ? finite_point : rows_[finite_point]; }
+
+ private:
+  template <class Fill>
+  void write(Buffer& buffer, std::size_t floats, Fill&& fill);
+  void write_values(Segment& segment, Buffer& buffer, std::span<const float> values);
+  void write_columns(Segment& segment, const PointsView& points);
+
+  const Device& device_;
+  Extent extent_;
+  ChunkShape shape_;
+  std::vector<std::uint32_t> rows_;  // empty where all points are finite
+  std::vector<Segment> segments_;
+  Buffer staging_;
+};
+
+}  // namespace swarmfit::kernels::vulkan

@@ -1,0 +1,87 @@
+#include "kernels/vulkan/pipelines.hpp"
+
+#include <array>
+#include <iterator>
+#include <span>
+#include <string_view>
+
+#include "shaders/layout.h"
+
+namespace swarmfit::kernels::vulkan {
+namespace {
+
+#include "embedded/assign.h"
+#include "embedded/assign_texels.h"
+#include "embedded/cost.h"
+#include "embedded/cost_texels.h"
+#include "embedded/distances.h"
+#include "embedded/distances_texels.h"
+#include "embedded/reduce.h"
+#include "embedded/shader_models.h"
+
+using Spirv = std::span<const std::uint32_t>;
+
+Spirv spirv(Shader shader, bool texels) {
+  switch (shader) {
+    case Shader::cost: return texels ? Spirv(cost_texels_spirv) : Spirv(cost_spirv);
+    case Shader::reduce: return reduce_spirv;
+    case Shader::distances: return texels ? Spirv(distances_texels_spirv) : Spirv(distances_spirv);
+    case Shader::assign: break;
+  }
+  return texels ? Spirv(assign_texels_spirv) : Spirv(assign_spirv);
+}
+
+vk::raii::DescriptorSetLayout make_set_layout(const Device& device) {
+  std::array<vk::DescriptorSetLayoutBinding, layout::kBindingCount> bindings;
+  for (std::uint32_t i = 0; i < bindings.size(); ++i) {
+    const auto type = i < layout::kStorageBindings ? vk::DescriptorType::eStorageBuffer : vk::DescriptorType::eUniformTexelBuffer;
+    bindings[i] = vk::DescriptorSetLayoutBinding(i, type, 1, vk::ShaderStageFlagBits::eCompute);
+  }
+  return vk::raii::DescriptorSetLayout(device.handle(), vk::DescriptorSetLayoutCreateInfo({}, bindings));
+}
+
+vk::raii::PipelineLayout make_layout(const Device& device, vk::DescriptorSetLayout sets) {
+  const vk::PushConstantRange push(vk::ShaderStageFlagBits::eCompute, 0, sizeof(layout::Push));
+  return vk::raii::PipelineLayout(device.handle(), vk::PipelineLayoutCreateInfo({}, sets, push));
+}
+
+}  // namespace
+
+bool has_shader(ModelKind kind) noexcept {
+  const auto number = static_cast<std::size_t>(kind);
+  return number < std::size(kShaderModels) && traits(kind).name == kShaderModels[number];
+}
+
+Pipelines::Pipelines(const Device& device, const std::filesystem::path& cache_folder)
+    : device_(device), cache_(device, cache_folder), set_layout_(make_set_layout(device)), layout_(make_layout(device, *set_layout_)) {
+  for (const Shader shader : {Shader::cost, Shader::reduce, Shader::distances, Shader::assign}) {
+    const Spirv code = spirv(shader, device.traits().texels);
+    modules_.emplace_back(device.handle(), vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data()));
+  }
+}
+
+Pipelines::~Pipelines() {
+  if (!pipelines_.empty()) cache_.save();
+}
+
+vk::Pipeline Pipelines::get(const Specialisation& wanted) {
+  const auto found = pipelines_.find(wanted);
+  if (found != pipelines_.end()) return *found->second;
+
+  std::array<std::uint32_t, layout::kSpecCount> values{};
+  values[layout::kSpecGroup] = wanted.group;
+  values[layout::kSpecModel] = wanted.model;
+  values[layout::kSpecLoss] = wanted.loss;
+  values[layout::kSpecDimension] = wanted.dimension;
+  values[layout::kSpecTile] = wanted.tile;
+  values[layout::kSpecWork] = wanted.work;
+  std::array<vk::SpecializationMapEntry, layout::kSpecCount> entries;
+  for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, i * 4, 4);
+  const vk::SpecializationInfo constants(static_cast<std::uint32_t>(entries.size()), entries.data(), sizeof values, values.data());
+  const vk::raii::ShaderModule& module = modules_[static_cast<std::size_t>(wanted.shader)];
+  const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module, "main", &constants);
+  vk::raii::Pipeline made(device_.handle(), cache_.handle(), vk::ComputePipelineCreateInfo({}, stage, *layout_));
+  return *pipelines_.emplace(wanted, std::move(made)).first->second;
+}
+
+}  // namespace swarmfit::kernels::vulkan

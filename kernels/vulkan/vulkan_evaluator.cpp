@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "kernels/checks.hpp"
+#include "kernels/evaluators.hpp"
+#include "kernels/vulkan/commands.hpp"
+#include "kernels/vulkan/guarded.hpp"
+#include "shaders/layout.h"
+
+namespace swarmfit::kernels {
+namespace vulkan {
+namespace {
+
+constexpr std::size_t kSmallestRange = 16384;  // a tile of particles and a chunk of points on any device
+
+class VulkanEvaluator final : public FitnessEvaluator {
+ public:
+  VulkanEvaluator(Instance instance, vk::raii::PhysicalDevice physical, const EvaluatorOptions& options)
+      : instance_(std::move(instance)),
+        physical_(std::move(physical)),
+        device_(physical_, options.max_storage_range),
+        pipelines_(device_, options.pipeline_cache),
+        cloud_(device_),
+        commands_(device_, pipelines_),
+        identity_{"vulkan", device_.traits().name} {}
+
+  const Identity& identity() const noexcept override { return identity_; }
+  Support supports(const Workload& workload) const override;
+  Result<> set_points(const PointsView& points) override;
+  Result<> set_caps(std::span<const float> caps) override;
+  Result<> evaluate(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs) override;
+  Result<> distances(const ModelView& model, std::span<float> distances) override;
+  Result<> assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) override;
+  Effort effort() const noexcept override { return effort_; }
+
+ private:
+  void evaluate_slice(const SwarmView& swarm, Loss loss, std::span<float> costs);
+  bool write_model(ModelKind kind, const double* parameters, std::span<float> row) const;
+  template <class T, class Out>
+  void read_output(std::span<Out> out);
+
+  Instance instance_;
+  vk::raii::PhysicalDevice physical_;
+  Device device_;
+  Pipelines pipelines_;
+  Cloud cloud_;
+  Commands commands_;
+  Identity identity_;
+  int dimension_ = 0;
+  Effort effort_;
+};
+
+Support VulkanEvaluator::supports(const Workload& workload) const {
+  const ModelTraits& model = traits(workload.kind);
+  if (!has_shader(workload.kind)) return {false, fmt::format("{} has no shader", model.name)};
+  const std::size_t bytes = workload.points * (static_cast<std::size_t>(model.dimension) + 1) * sizeof(float);
+  if (bytes > device_.traits().memory) {
+    return {false, fmt::format("{} points take {} bytes, {} has {}", workload.points, bytes, identity_.device, device_.traits().memory)};
+  }
+  return {};
+}
+
+Result<> VulkanEvaluator::set_points(const PointsView& points) {
+  if (auto ok = check_points(points); !ok) return ok;
+  dimension_ = 0;  // until all of it has worked
+  auto done = guarded("set_points", Failure::Kind::device, [&]() -> Result<> {
+    if (auto ok = cloud_.set(points, measure(points)); !ok) return ok;
+    commands_.bind(cloud_, points.dimension);
+    return {};
+  });
+  if (done) dimension_ = points.dimension;
+  effort_ = {};
+  return done;
+}
+
+Result<> VulkanEvaluator::set_caps(std::span<const float> caps) {
+  if (auto ok = check_caps(caps, cloud_.extent().finite); !ok) return ok;
+  return guarded("set_caps", Failure::Kind::device, [&]() -> Result<> {
+    cloud_.write_caps(caps);
+    return {};
+  });
+}
+
+Result<> VulkanEvaluator::evaluate(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs) {
+  if (auto ok = check_swarm(swarm, dimension_, cutoffs, costs); !ok) return ok;
+  auto done = guarded("evaluate", Failure::Kind::device, [&]() -> Result<> {
+    const auto width = static_cast<std::size_t>(traits(swarm.kind).parameter_count);
+    const std::size_t limit = commands_.swarm_limit();
+    for (std::size_t j = 0; j < swarm.count; j += limit) {
+      const std::size_t count = std::min(limit, swarm.count - j);
+      evaluate_slice({swarm.kind, count, swarm.parameters.subspan(j * width, count * width)}, loss, costs.subspan(j, count));
+    }
+    return {};
+  });
+  if (!done) return done;
+  effort_.evaluations += swarm.count;
+  effort_.point_models += swarm.count * cloud_.extent().finite_count;
+  effort_.touched += swarm.count * cloud_.extent().finite_count;
+  return {};
+}
+
+void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::span<float> costs) {
+  const auto width = static_cast<std::size_t>(traits(swarm.kind).parameter_count);
+  const std::span<float> rows = commands_.coefficients(swarm.count);
+  for (std::size_t j = 0; j < swarm.count; ++j) {
+    write_model(swarm.kind, swarm.parameters.data() + j * width, rows.subspan(j * layout::kCoefficientStride, layout::kCoefficientStride));
+  }
+  if (cloud_.segments().empty()) {
+    std::fill(costs.begin(), costs.end(), 0.0F);
+  } else {
+    commands_.costs(swarm.kind, loss, costs);
+  }
+  for (std::size_t j = 0; j < swarm.count; ++j) {
+    double k[kMaxParameters];
+    if (!centred_coefficients(swarm.kind, swarm.parameters.data() + j * width, cloud_.extent().centre, k)) {
+      costs[j] = std::numeric_limits<float>::infinity();
+    }
+  }
+}
+
+/// Returns false, and writes zeros, if a coefficient is not finite.
+bool VulkanEvaluator::write_model(ModelKind kind, const double* parameters, std::span<float> row) const {
+  double k[kMaxParameters];
+  const bool finite = centred_coefficients(kind, parameters, cloud_.extent().centre, k);
+  std::fill(row.begin(), row.end(), 0.0F);
+  if (finite) std::copy_n(k, traits(kind).coefficient_count, row.begin());
+  row[layout::kKindSlot] = static_cast<float>(kind);
+  return finite;
+}
+
+template <class T, class Out>
+void VulkanEvaluator::read_output(std::span<Out> out) {
+  for (const Segment& segment : cloud_.segments()) {
+    const std::span<const T> values = segment.output.as<const T>();
+    for (std::size_t i = 0; i < segment.count; ++i) out[cloud_.row(segment.first + i)] = static_cast<Out>(values[i]);
+  }
+}
+
+Result<> VulkanEvaluator::distances(const ModelView& model, std::span<float> distances) {
+  if (auto ok = check_model(model, dimension_); !ok) return ok;
+  if (auto ok = check_size("distances.size()", distances.size(), cloud_.extent().finite.size()); !ok) return ok;
+  return guarded("distances", Failure::Kind::device, [&]() -> Result<> {
+    const bool finite = write_model(model.kind, model.parameters.data(), commands_.coefficients(1));
+    if (!cloud_.segments().empty() && finite) commands_.distances(model.kind);
+    std::fill(distances.begin(), distances.end(), std::numeric_limits<float>::quiet_NaN());
+    if (finite) {
+      read_output<float>(distances);
+    } else {
+      for (std::size_t i = 0; i < distances.size(); ++i) {
+        if (cloud_.extent().finite[i]) distances[i] = std::numeric_limits<float>::infinity();
+      }
+    }
+    return {};
+  });
+}
+
+Result<> VulkanEvaluator::assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) {
+  if (auto ok = check_assign(models, dimension_, cloud_.extent().finite.size(), tolerance, labels); !ok) return ok;
+  if (models.size() > commands_.model_limit()) {
+    return fail(Failure::Kind::invalid, fmt::format("models.size() is {}, must be <= {} on {}", models.size(), commands_.model_limit(), identity_.device));
+  }
+  return guarded("assign", Failure::Kind::device, [&]() -> Result<> {
+    std::fill(labels.begin(), labels.end(), std::uint16_t{0});
+    if (cloud_.segments().empty() || models.empty()) return {};
+    const std::span<float> rows = commands_.coefficients(models.size());
+    std::size_t written = 0;
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      const std::span<float> row = rows.subspan(written * layout::kCoefficientStride, layout::kCoefficientStride);
+      if (!write_model(models[m].kind, models[m].parameters.data(), row)) continue;
+      row[layout::kNumberSlot] = static_cast<float>(m + 1);
+      ++written;
+    }
+    if (tolerance.size() > 1) cloud_.write_tolerance(tolerance);
+    commands_.assign(written, tolerance.size() > 1 ? -1.0F : tolerance[0]);
+    read_output<std::uint32_t>(labels);
+    return {};
+  });
+}
+
+bool contains_ignoring_case(std::string_view text, std::string_view part) {
+  const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b)); };
+  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
+}
+
+Result<std::unique_ptr<FitnessEvaluator>> make(const EvaluatorOptions& options, std::string_view name) {
+  Instance instance(options);
+  std::string seen;
+  for (vk::raii::PhysicalDevice& device : instance.devices()) {
+    const std::string device_name = device.getProperties().deviceName.data();
+    const std::string why = obstacle(device);
+    if (why.empty() && contains_ignoring_case(device_name, name)) {
+      return std::make_unique<VulkanEvaluator>(std::move(instance), std::move(device), options);
+    }
+    seen += fmt::format("{}{}{}", seen.empty() ? "" : ", ", device_name, why.empty() ? "" : " (" + why + ")");
+  }
+  if (seen.empty()) seen = "none";
+  return fail(Failure::Kind::unavailable,
+              name.empty() ? fmt::format("backend is 'vulkan', but no device can be used; there are: {}", seen)
+                           : fmt::format("vulkan device is '{}', must be one of: {}", name, seen));
+}
+
+}  // namespace
+}  // namespace vulkan
+
+Result<std::unique_ptr<FitnessEvaluator>> make_vulkan_evaluator(const EvaluatorOptions& options, std::string_view device) {
+  if (options.max_storage_range > 0 && options.max_storage_range < vulkan::kSmallestRange) {
+    return fail(Failure::Kind::invalid,
+                fmt::format("max_storage_range is {}, must be 0 or >= {}", options.max_storage_range, vulkan::kSmallestRange));
+  }
+  return vulkan::guarded("opening a device", Failure::Kind::unavailable, [&] { return vulkan::make(options, device); });
+}
+
+}  // namespace swarmfit::kernels

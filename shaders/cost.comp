@@ -1,0 +1,59 @@
+// First pass of a swarm's costs: each group sums the loss of kTile particles over one chunk of points,
+// kSpecGroup x kWork quads. Coefficients and sums stay in registers; every sum is taken in a fixed order.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "common.glsl"
+
+layout(constant_id = kSpecLoss) const uint kLoss = 0;
+layout(constant_id = kSpecTile) const uint kTile = 8;
+layout(constant_id = kSpecWork) const uint kWork = 8;
+
+layout(set = 0, binding = kBindPartials, std430) writeonly buffer Partials { float partials[]; };
+
+shared float sums[kTile * gl_WorkGroupSize.x];
+
+// Eqs. (3), (4) of Zhou et al. for four points.
+vec4 loss(vec4 residuals, vec4 cap) {
+  if (kLoss == kLossL2) return min(residuals * residuals, cap * cap);
+  return min(abs(residuals), cap);
+}
+
+void main() {
+  const uint group = gl_WorkGroupSize.x;
+  const uint lane = gl_LocalInvocationID.x;
+  const uint chunk = gl_WorkGroupID.x;
+  const uint first = push.first_model + gl_WorkGroupID.y * kTile;
+
+  float k[kTile * kCoefficientStride];
+  float sum[kTile];
+  [[unroll]] for (uint t = 0; t < kTile; ++t) {
+    float one[kCoefficientStride];
+    load_model(first + t, one);
+    [[unroll]] for (uint i = 0; i < kCoefficientStride; ++i) k[t * kCoefficientStride + i] = one[i];
+    sum[t] = 0.0;
+  }
+
+  for (uint w = 0; w < kWork; ++w) {
+    const uint q = (chunk * kWork + w) * group + lane;
+    vec4 x[kMaxColumns];
+    load_quad(q, x);
+    const vec4 cap = load_caps(q);
+    [[unroll]] for (uint t = 0; t < kTile; ++t) {
+      float one[kCoefficientStride];
+      [[unroll]] for (uint i = 0; i < kCoefficientStride; ++i) one[i] = k[t * kCoefficientStride + i];
+      const vec4 four = loss(residuals(kModel, x, one), cap);
+      sum[t] += (four.x + four.y) + (four.z + four.w);
+    }
+  }
+
+  [[unroll]] for (uint t = 0; t < kTile; ++t) sums[t * group + lane] = sum[t];
+  barrier();
+  for (uint half_width = group / 2; half_width > 0; half_width /= 2) {
+    for (uint i = lane; i < kTile * half_width; i += group) {
+      const uint at = (i / half_width) * group + i % half_width;
+      sums[at] += sums[at + half_width];
+    }
+    barrier();
+  }
+  for (uint t = lane; t < kTile; t += group) partials[(first + t) * push.chunks + chunk] = sums[t * group];
+}

@@ -1,0 +1,57 @@
+// Shared by C++ and GLSL: where buffers are bound, which specialisation constant is which, and what is pushed.
+#ifndef SWARMFIT_SHADERS_LAYOUT_H
+#define SWARMFIT_SHADERS_LAYOUT_H
+
+#ifdef __cplusplus
+#include <cstdint>
+#define SWARMFIT_CONST inline constexpr std::uint32_t
+namespace swarmfit::kernels::layout {
+using uint = std::uint32_t;
+#else
+#define SWARMFIT_CONST const uint
+#endif
+
+// One descriptor set for all shaders.
+SWARMFIT_CONST kBindPoints = 0;        // column after column, `column_stride` floats each, read four points at a time
+SWARMFIT_CONST kBindCaps = 1;          // one a point; assign.comp reads tolerances here
+SWARMFIT_CONST kBindCoefficients = 2;  // kCoefficientStride floats a model
+SWARMFIT_CONST kBindPartials = 3;      // [model][chunk]; distances and labels are written here
+SWARMFIT_CONST kBindCosts = 4;         // [model]
+SWARMFIT_CONST kStorageBindings = 5;
+// The first three once more, as texel buffers of single floats: see fetch.glsl.
+SWARMFIT_CONST kBindPointTexels = 5;
+SWARMFIT_CONST kBindCapTexels = 6;
+SWARMFIT_CONST kBindCoefficientTexels = 7;
+SWARMFIT_CONST kBindingCount = 8;
+
+// Specialisation constants.
+SWARMFIT_CONST kSpecGroup = 0;      // invocations in a group: the subgroup's size or a multiple of it
+SWARMFIT_CONST kSpecModel = 1;      // a ModelKind
+SWARMFIT_CONST kSpecLoss = 2;       // a Loss
+SWARMFIT_CONST kSpecDimension = 3;  // columns of a point
+SWARMFIT_CONST kSpecTile = 4;       // particles held by an invocation
+SWARMFIT_CONST kSpecWork = 5;       // quads (four points) an invocation goes through
+SWARMFIT_CONST kSpecCount = 6;
+
+SWARMFIT_CONST kLossL1 = 0;
+SWARMFIT_CONST kLossL2 = 1;
+
+SWARMFIT_CONST kMaxColumns = 4;
+SWARMFIT_CONST kCoefficientStride = 16;  // floats from one model to the next: kMaxParameters coefficients, then
+SWARMFIT_CONST kKindSlot = 14;           // assign: its ModelKind
+SWARMFIT_CONST kNumberSlot = 15;         // assign: its label
+SWARMFIT_CONST kQuad = 4;
+
+struct Push {
+  uint column_stride;  // points in a column, padding included; a multiple of kQuad
+  uint chunks;         // groups of points: the row length of the partials
+  uint first_model;    // cost: first particle of the tile row; distances, assign: unused
+  uint models;         // assign: how many
+  float tolerance;     // assign: for all points; negative where each has its own
+};
+
+#ifdef __cplusplus
+}  // namespace swarmfit::kernels::layout
+#endif
+#undef SWARMFIT_CONST
+#endif
