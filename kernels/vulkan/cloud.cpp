@@ -1,16 +1,15 @@
 #include "kernels/vulkan/cloud.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include <fmt/format.h>
 
 namespace swarmfit::kernels::vulkan {
 namespace {
 
-/// A centred coordinate as float. Beyond float's range a point is as good as infinitely far, but its residual must not become inf - inf.
+/// A centred coordinate as float. What float cannot hold is as good as infinitely far, but a residual must not become inf - inf.
 float centred(double value, double centre) {
-  constexpr double kFar = std::numeric_limits<float>::max() / 16;
+  constexpr double kFar = 1e30;
   return static_cast<float>(std::clamp(value - centre, -kFar, kFar));
 }
 

@@ -127,7 +127,11 @@ bool VulkanEvaluator::write_model(ModelKind kind, const double* parameters, std:
   double k[kMaxParameters];
   const bool finite = centred_coefficients(kind, parameters, cloud_.extent().centre, k);
   std::fill(row.begin(), row.end(), 0.0F);
-  if (finite) std::copy_n(k, traits(kind).coefficient_count, row.begin());
+  // What float cannot hold is farther away than any point either way.
+  constexpr double kMost = 1e30;
+  for (int c = 0; finite && c < traits(kind).coefficient_count; ++c) {
+    row[static_cast<std::size_t>(c)] = static_cast<float>(std::clamp(k[c], -kMost, kMost));
+  }
   row[layout::kKindSlot] = static_cast<float>(kind);
   return finite;
 }
