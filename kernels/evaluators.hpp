@@ -15,6 +15,7 @@ namespace swarmfit::kernels {
 struct EvaluatorOptions {
   int threads = 0;                        ///< worker threads of the CPU back end; 0 takes all
   std::string simd;                       ///< CPU instruction set by name ("scalar", "AVX2", ...); empty takes the best
+  bool pruning = true;                    ///< leave out what provably changes no cost; the costs are the same either way
   bool validation = false;                ///< Vulkan validation layers with synchronisation validation
   std::function<void(std::string_view)> on_validation;  ///< called with every validation message
   std::filesystem::path pipeline_cache;   ///< folder of Vulkan pipeline caches; empty keeps none

@@ -24,7 +24,7 @@ namespace {
 
 using namespace cpu;
 
-constexpr int kMaxThreads = 1024;
+constexpr int kMaxThreads = 4096;
 /// Runs of tiles whose costs are summed first; few, so that partial sums stay small whatever the size of the cloud.
 constexpr std::size_t kMaxRuns = 128;
 

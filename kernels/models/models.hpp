@@ -22,6 +22,7 @@ struct ModelTraits {
   int dimension = 0;          ///< columns of a point
   int parameter_count = 0;    ///< doubles in the data's frame, as results give them
   int coefficient_count = 0;  ///< scalars in the centred frame, as kernels read them
+  int multiply_adds = 0;      ///< fused multiply-adds of one residual: what the machine's limit is divided by
 };
 
 const ModelTraits& traits(ModelKind kind) noexcept;
