@@ -7,7 +7,7 @@ packages=(
   # build
   g++ cmake ninja-build ccache
   # Vulkan: headers and loader, a software device (lavapipe), validation, GLSL to SPIR-V
-  libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools spirv-tools
+  libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools
   # libraries
   libhwy-dev libtbb-dev libeigen3-dev librandom123-dev libexpected-dev libcli11-dev nlohmann-json3-dev libfmt-dev liblzf-dev
   libopencv-dev
