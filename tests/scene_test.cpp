@@ -107,12 +107,13 @@ TEST(Scene, ObjectsStandOnASupport) {
   for (std::size_t i = 0; i < scene.cloud.size(); ++i) {
     const auto k = scene.truth.object_labels[i];
     if (k == 0 || !finite(scene.cloud, i)) continue;
-    for (const auto& plane : scene.truth.planes) {
-      const double height = plane.head<3>().dot(point(scene.cloud, i)) + plane[3];
-      if (height > -0.02) lowest[k] = std::min(lowest[k], std::abs(height));
-    }
+    const Eigen::Vector4d& plane = scene.truth.planes[scene.truth.object_planes[k - 1] - 1U];
+    lowest[k] = std::min(lowest[k], plane.head<3>().dot(point(scene.cloud, i)) + plane[3]);
   }
-  for (std::size_t k = 1; k < lowest.size(); ++k) EXPECT_LT(lowest[k], 0.02) << "object " << k << " floats";
+  for (std::size_t k = 1; k < lowest.size(); ++k) {
+    EXPECT_LT(lowest[k], 0.02) << "object " << k << " floats";
+    EXPECT_GT(lowest[k], -0.03) << "object " << k << " sinks";
+  }
 }
 
 TEST(Scene, HasHolesAtEdgesAndPatches) {

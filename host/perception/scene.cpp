@@ -133,6 +133,7 @@ class Camera {
     for (std::size_t k = 1; k < seen.size(); ++k) {
       if (seen[k] * 1500 < pixels_.size()) continue;
       truth.object_names.push_back(room_.object_names[k - 1]);
+      truth.object_planes.push_back(room_.object_supports[k - 1]);
       number[k] = static_cast<std::uint16_t>(truth.object_names.size());
     }
     truth.objects = truth.object_names.size();

@@ -137,6 +137,7 @@ class Furnisher {
     const double x = where.x() + dice_.between(-0.025, 0.025), y = where.y() + dice_.between(-0.025, 0.025), z = where.z();
     static constexpr const char* names[] = {"mug", "can", "carton", "ball", "box", "book", "cup"};
     room_.object_names.emplace_back(names[kind]);
+    room_.object_supports.push_back(static_cast<std::uint16_t>(room_.support_heights.size()));  // the last one built
     const auto id = static_cast<std::uint16_t>(room_.object_names.size());
     switch (kind) {
       case 0:

@@ -11,9 +11,9 @@ namespace swarmfit::perception {
 
 /// What the cut starts from: 3D knowledge on the image grid.
 struct SegmentationInput {
-  const Cloud& frame;                             ///< organised and coloured
-  std::span<const std::uint16_t> plane_labels;    ///< one a pixel: k-th plane, 0 none
-  std::span<const std::uint16_t> popout;          ///< one a pixel: k-th SOI, 0 none
+  const Cloud& frame;                           ///< organised and coloured
+  std::span<const std::uint16_t> plane_labels;  ///< one a pixel: k-th plane, 0 none
+  std::span<const std::uint16_t> popout;        ///< one a pixel: k-th SOI, 0 none
   std::span<const SpaceOfInterest> sois;
 };
 

@@ -18,7 +18,8 @@ struct SceneTruth {
   std::vector<std::uint16_t> plane_labels;   ///< one a pixel: 0, or k for the k-th supporting surface
   std::vector<std::uint16_t> object_labels;  ///< one a pixel: 0, or k for the k-th object
   std::size_t objects = 0;
-  std::vector<std::string> object_names;  ///< "mug", "can", "carton" ...; one an object
+  std::vector<std::uint16_t> object_planes;  ///< the supporting surface each object stands on, 1-based
+  std::vector<std::string> object_names;     ///< "mug", "can", "carton" ...; one an object
 };
 
 /// What is printed on the front of one of the scene's cartons, seen straight on: an entry for a recogniser's gallery.

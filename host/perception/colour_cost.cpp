@@ -1,0 +1,100 @@
+#include "host/perception/colour_cost.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace swarmfit::perception {
+namespace {
+constexpr std::uint16_t kUnknown = 65535;
+}
+
+Hls to_hls(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  const int high = std::max({red, green, blue}), low = std::min({red, green, blue}), range = high - low, sum = high + low;
+  Hls out;
+  out.l = static_cast<float>(sum) / 510;
+  if (range == 0) return out;  // grey has no hue
+  out.s = static_cast<float>(range) / static_cast<float>(sum <= 255 ? sum : 510 - sum);
+  const float unit = 1.0f / (6.0f * static_cast<float>(range));
+  if (high == red) {
+    out.h = static_cast<float>(green - blue) * unit;
+  } else if (high == green) {
+    out.h = static_cast<float>(blue - red) * unit + 1.0f / 3;
+  } else {
+    out.h = static_cast<float>(red - green) * unit + 2.0f / 3;
+  }
+  if (out.h < 0) out.h += 1;
+  return out;
+}
+
+int neighbours_for(std::size_t sample_size) {
+  return std::max(1, static_cast<int>(std::lround(std::sqrt(static_cast<double>(sample_size)))));
+}
+
+void ColourSample::add(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  const Hls colour = to_hls(red, green, blue);
+  hue_.push_back(colour.h);
+  lightness_.push_back(colour.l);
+  saturation_.push_back(colour.s);
+}
+
+void ColourSample::close(std::size_t largest) {
+  const std::size_t size = hue_.size();
+  if (size > largest) {
+    for (std::size_t i = 0; i < largest; ++i) {
+      const std::size_t from = i * size / largest;
+      hue_[i] = hue_[from];
+      lightness_[i] = lightness_[from];
+      saturation_[i] = saturation_[from];
+    }
+    hue_.resize(largest);
+    lightness_.resize(largest);
+    saturation_.resize(largest);
+  }
+  if (neighbours_ <= 0) neighbours_ = neighbours_for(hue_.size());
+  neighbours_ = std::min(neighbours_, static_cast<int>(std::max<std::size_t>(hue_.size(), 1)));
+  distances_.resize(hue_.size());
+  remembered_.assign(std::size_t{1} << (3 * bits_), kUnknown);
+}
+
+float ColourSample::cost(const Hls& colour) {
+  if (empty()) return 1;
+  const std::size_t size = hue_.size();
+  const Hls query = colour;
+  const float *hue = hue_.data(), *lightness = lightness_.data(), *saturation = saturation_.data();
+  float* distance = distances_.data();
+  for (std::size_t i = 0; i < size; ++i) distance[i] = colour_distance(query, {hue[i], lightness[i], saturation[i]});
+  // Which of 64 equal bins holds the K-th nearest: what lies below counts whole, only that bin is put in order.
+  constexpr float kBins = 64;
+  std::array<int, 65> count{};
+  for (std::size_t i = 0; i < size; ++i) ++count[static_cast<std::size_t>(static_cast<int>(distance[i] * kBins))];
+  int left = neighbours_;
+  std::size_t bin = 0;
+  while (count[bin] < left) left -= count[bin++];
+  float sum = 0;
+  edge_.clear();
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto in = static_cast<std::size_t>(static_cast<int>(distance[i] * kBins));
+    if (in < bin) sum += distance[i];
+    if (in == bin) edge_.push_back(distance[i]);
+  }
+  std::partial_sort(edge_.begin(), edge_.begin() + left, edge_.end());
+  for (int i = 0; i < left; ++i) sum += edge_[static_cast<std::size_t>(i)];
+  return sum / static_cast<float>(neighbours_);
+}
+
+float ColourSample::cost(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  const int drop = 8 - bits_;
+  const auto key = (static_cast<std::size_t>(red >> drop) << (2 * bits_)) | (static_cast<std::size_t>(green >> drop) << bits_) |
+                   static_cast<std::size_t>(blue >> drop);
+  std::uint16_t& known = remembered_[key];
+  if (known == kUnknown) {
+    // The middle of the cell stands for all of it.
+    const int middle = drop > 0 ? 1 << (drop - 1) : 0;
+    const auto centre = [&](std::uint8_t x) { return static_cast<std::uint8_t>(((x >> drop) << drop) + middle); };
+    known = static_cast<std::uint16_t>(cost(to_hls(centre(red), centre(green), centre(blue))) * 65534 + 0.5f);
+  }
+  return static_cast<float>(known) / 65534;
+}
+
+}  // namespace swarmfit::perception

@@ -1,0 +1,68 @@
+#include "host/perception/segmentation.hpp"
+
+#include <algorithm>
+
+#include <opencv2/imgproc.hpp>
+
+#include "host/perception/segmentation_grid.hpp"
+
+namespace swarmfit::perception {
+
+std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGrid& grid, double margin, int least_border) {
+  struct Box {
+    int left = 1 << 30, top = 1 << 30, right = -1, bottom = -1;
+  };
+  std::vector<Box> boxes(input.sois.size());
+  for (int v = 0; v < grid.height(); ++v)
+    for (int u = 0; u < grid.width(); ++u) {
+      const std::size_t k = input.popout[grid.index(u, v)];
+      if (k == 0 || k > boxes.size()) continue;
+      Box& box = boxes[k - 1];
+      box = {std::min(box.left, u), std::min(box.top, v), std::max(box.right, u), std::max(box.bottom, v)};
+    }
+  std::vector<SoiRegion> regions(input.sois.size());
+  const cv::Rect image(0, 0, grid.width(), grid.height());
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    const Box& box = boxes[k];
+    if (box.right < 0) continue;
+    SoiRegion& region = regions[k];
+    region.label = static_cast<std::uint16_t>(k + 1);
+    const int width = box.right - box.left + 1, height = box.bottom - box.top + 1;
+    const int border = std::max(least_border, static_cast<int>((margin - 1) * std::max(width, height) / 2 + 0.5));
+    const auto& soi_box = input.sois[k].bbox;
+    region.rect = cv::Rect(box.left - border, box.top - border, width + 2 * border, height + 2 * border);
+    if (soi_box[2] > 0 && soi_box[3] > 0) region.rect |= cv::Rect(soi_box[0], soi_box[1], soi_box[2], soi_box[3]);
+    region.rect &= image;
+    cv::Mat1b off(region.rect.size());
+    for (int y = 0; y < off.rows; ++y)
+      for (int x = 0; x < off.cols; ++x)
+        off(y, x) = input.popout[grid.index(region.rect.x + x, region.rect.y + y)] == region.label ? 0 : 255;
+    cv::distanceTransform(off, region.distance, cv::DIST_L2, cv::DIST_MASK_5);
+  }
+  return regions;
+}
+
+SoiColours soi_colours(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, int neighbours, int bits,
+                       std::size_t largest) {
+  SoiColours colours{ColourSample(neighbours, bits), ColourSample(neighbours, bits)};
+  const SpaceOfInterest& soi = input.sois[region.label - 1U];
+  for (int v = region.rect.y; v < region.rect.br().y; ++v)
+    for (int u = region.rect.x; u < region.rect.br().x; ++u) {
+      const std::size_t i = grid.index(u, v);
+      if (input.popout[i] == region.label) {
+        colours.object.add(grid.rgb(i)[0], grid.rgb(i)[1], grid.rgb(i)[2]);
+      } else if (grid.finite(i) && (grid.point(i) - soi.centre).norm() <= soi.radius) {
+        colours.background.add(grid.rgb(i)[0], grid.rgb(i)[1], grid.rgb(i)[2]);
+      }
+    }
+  colours.object.close(largest);
+  colours.background.close(largest);
+  return colours;
+}
+
+std::vector<std::uint16_t> segment_objects(const SegmentationInput& input, const PerceiveOptions& options) {
+  if (input.sois.empty()) return std::vector<std::uint16_t>(input.popout.size(), 0);
+  return options.fit.preset == Preset::paper ? segment_paper(input, options) : segment_fused(input, options);
+}
+
+}  // namespace swarmfit::perception

@@ -1,0 +1,85 @@
+// The frame as the two segmentations read it.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "host/perception/colour_cost.hpp"
+#include "host/perception/segmentation.hpp"
+
+namespace swarmfit::perception {
+
+/// Costs are in [0, 1] a term; whole numbers for the cut.
+inline constexpr double kCostUnit = 4096;
+inline std::int64_t to_cost(double cost) { return static_cast<std::int64_t>(std::lround(kCostUnit * cost)); }
+
+class PixelGrid {
+ public:
+  explicit PixelGrid(const Cloud& frame) : frame_(frame) {}
+
+  int width() const noexcept { return frame_.width; }
+  int height() const noexcept { return frame_.height; }
+  std::size_t size() const noexcept { return frame_.size(); }
+  std::size_t index(int u, int v) const noexcept {
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(frame_.width) + static_cast<std::size_t>(u);
+  }
+  Eigen::Vector3d point(std::size_t i) const {
+    if (frame_.values64.empty()) return {frame_.values32[3 * i], frame_.values32[3 * i + 1], frame_.values32[3 * i + 2]};
+    return {frame_.values64[3 * i], frame_.values64[3 * i + 1], frame_.values64[3 * i + 2]};
+  }
+  bool finite(std::size_t i) const {
+    return frame_.values64.empty() ? std::isfinite(frame_.values32[3 * i]) && std::isfinite(frame_.values32[3 * i + 1]) &&
+                                         std::isfinite(frame_.values32[3 * i + 2])
+                                   : std::isfinite(frame_.values64[3 * i]) && std::isfinite(frame_.values64[3 * i + 1]) &&
+                                         std::isfinite(frame_.values64[3 * i + 2]);
+  }
+  const std::uint8_t* rgb(std::size_t i) const { return &frame_.rgb[3 * i]; }
+
+ private:
+  const Cloud& frame_;
+};
+
+/// Where one space of interest lies in the image.
+struct SoiRegion {
+  std::uint16_t label = 0;  ///< k, 1-based; 0 where the SOI has no pixel
+  cv::Rect rect;            ///< the group's box, enlarged by the SOI's margin
+  cv::Mat1f distance;       ///< in rect: to the nearest pixel of the group [px]
+};
+
+/// One region a SOI, in their order.
+std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGrid& grid, double margin, int least_border);
+
+/// Colour samples of a space of interest: `object` from its back-projected points, `background` from the others within its sphere.
+struct SoiColours {
+  ColourSample object, background;
+};
+SoiColours soi_colours(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, int neighbours, int bits,
+                       std::size_t largest);
+
+/// The paper's cut, one SOI after another. segmentation_paper.cpp
+std::vector<std::uint16_t> segment_paper(const SegmentationInput& input, const PerceiveOptions& options);
+/// Weights of the fused cut, chosen on labelled Kinect frames.
+struct FusedTuning {
+  double band = 6;                 ///< seen pixels farther from every group are background [px at 640 columns]
+  double reach = 16;               ///< so are unseen ones farther than this
+  double smoothness = 0.6;         ///< of a boundary between two alike pixels side by side
+  double flat = 0.1;               ///< share of that which contrast cannot take away
+  double at_jump = 0.2;            ///< share that is left where the depth breaks
+  double uncertain = 0.6;          ///< cost of the third label, for unseen pixels
+  double depth = 1.5;              ///< what the depth says, where there is one
+  double colour_with_depth = 0.3;  ///< and how much the colour counts beside it
+  double rise_from = 2;            ///< heights below this many sigma speak for the plane
+  double spatial = 0.5;            ///< of the distance from the group, at reach
+  double colour_floor = 0.05;      ///< two colour costs well below this tell nothing
+  std::size_t largest_sample = 256;
+};
+
+/// One cut for all SOIs, with what the depth knows. segmentation_fused.cpp
+std::vector<std::uint16_t> segment_fused(const SegmentationInput& input, const PerceiveOptions& options, const FusedTuning& tuning = {});
+
+}  // namespace swarmfit::perception
