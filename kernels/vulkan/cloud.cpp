@@ -24,7 +24,7 @@ std::size_t segment_limit(const DeviceTraits& device, const ChunkShape& shape, i
 
 Result<> Cloud::set(const PointsView& points, Extent extent) {
   extent_ = std::move(extent);
-  shape_ = chunk_shape(device_.traits(), extent_.finite_count);
+  shape_ = chunk_shape(device_.traits(), extent_.finite_count, points.dimension);
   const std::size_t limit = segment_limit(device_.traits(), shape_, points.dimension);
   if (limit == 0) {
     return fail(Failure::Kind::invalid, fmt::format("the device's storage range is {} bytes, must be >= {}", device_.traits().storage_range,

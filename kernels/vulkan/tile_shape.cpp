@@ -14,7 +14,7 @@ std::uint32_t ceil_div(std::size_t a, std::size_t b) { return static_cast<std::u
 // and a chunk must be long to make up for filling the tile. A GPU wants many groups, each light on registers.
 std::uint32_t largest_tile(const DeviceTraits& device) { return device.software ? 32 : 16; }
 
-ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points) {
+ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimension) {
   ChunkShape shape;
   const std::uint32_t wanted_group = device.software ? device.subgroup : std::max<std::uint32_t>(128, device.subgroup);
   shape.group = std::bit_floor(std::min(wanted_group, device.group_limit));
@@ -22,6 +22,8 @@ ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points) {
   const std::size_t wanted_chunks = device.software ? 16 : 512;
   const std::size_t work = points / (wanted_chunks * shape.group * 4);
   shape.work = static_cast<std::uint32_t>(std::bit_floor(std::clamp<std::size_t>(work, 1, most_work)));
+  const std::size_t columns = device.storage_range / (sizeof(float) * static_cast<std::size_t>(dimension));
+  while (shape.work > 1 && shape.points() > columns) shape.work /= 2;
   return shape;
 }
 

@@ -13,7 +13,7 @@ struct ChunkShape {
   std::uint32_t work = 0;   ///< quads an invocation goes through
   std::uint32_t points() const noexcept { return group * work * 4; }
 };
-ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points);
+ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimension);
 
 /// How the particles are cut: into `tiles` of `tile` each, the last one padded.
 struct TileShape {

@@ -1,0 +1,161 @@
+// What a back end promises beyond the seam: threads that change nothing, small storage ranges, the pipeline cache, validation.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "conformance.hpp"
+
+namespace swarmfit::kernels::conformance {
+namespace {
+
+class Devices : public Conformance {
+ protected:
+  /// A second evaluator, with other options.
+  std::unique_ptr<FitnessEvaluator> make(const EvaluatorOptions& options) {
+    auto made = GetParam().backend == "cpu" ? make_cpu_evaluator(options) : make_vulkan_evaluator(options, "");
+    if (made) return std::move(*made);
+    ADD_FAILURE() << made.error().message;
+    return nullptr;
+  }
+
+  std::vector<float> costs_of(FitnessEvaluator& one, const Cloud& cloud, ModelKind kind, const std::vector<double>& swarm) {
+    EXPECT_OK(one.set_points(cloud.view()));
+    EXPECT_OK(one.set_caps(cloud.caps));
+    Guarded<float> out(swarm.size() / static_cast<std::size_t>(traits(kind).parameter_count));
+    EXPECT_OK(one.evaluate({kind, out.span().size(), swarm}, Loss::truncated_l1, {}, out.span()));
+    EXPECT_TRUE(out.intact());
+    return {out.span().begin(), out.span().end()};
+  }
+};
+class CpuDevices : public Devices {};
+class VulkanDevices : public Devices {};
+INSTANTIATE_TEST_SUITE_P(Conformance, CpuDevices, testing::ValuesIn(contenders("cpu")), contender_name);
+INSTANTIATE_TEST_SUITE_P(Conformance, VulkanDevices, testing::ValuesIn(contenders("vulkan")), contender_name);
+
+TEST_P(CpuDevices, ThreadsChangeNothing) {
+  const Cloud cloud = make_cloud(ModelKind::plane, 200001);
+  const std::vector<double> swarm = make_swarm(ModelKind::plane, 65);
+  EvaluatorOptions options = GetParam().options;
+  std::vector<float> first;
+  for (const int threads : {1, 2, 3}) {
+    options.threads = threads;
+    const auto one = make(options);
+    ASSERT_TRUE(one);
+    const std::vector<float> found = costs_of(*one, cloud, ModelKind::plane, swarm);
+    if (first.empty()) first = found;
+    EXPECT_EQ(found, first) << threads << " threads";
+  }
+}
+
+TEST_P(VulkanDevices, SmallStorageRangesSplitTheCloud) {
+  EvaluatorOptions options = GetParam().options;
+  for (const std::size_t range : {16384, 50000, 1000000}) {
+    SCOPED_TRACE("range " + std::to_string(range));
+    options.max_storage_range = range;
+    const auto small = make(options);
+    ASSERT_TRUE(small);
+    for (const ModelKind kind : kModelKinds) {
+      Cloud cloud = make_cloud(kind, 60001);
+      cloud.narrow[7] = std::numeric_limits<float>::quiet_NaN();
+      load(cloud);
+      const std::vector<double> swarm = make_swarm(kind, 300);
+      const std::vector<float> whole = costs(kind, swarm, Loss::truncated_l1);
+      const std::vector<float> split = costs_of(*small, cloud, kind, swarm);
+      double worst = 0;
+      for (std::size_t j = 0; j < whole.size(); ++j) worst = std::max(worst, std::abs(static_cast<double>(split[j] - whole[j])));
+      EXPECT_LE(worst, kCostTolerance * cloud.worst_loss(Loss::truncated_l1));
+
+      const ModelView model{kind, std::span(swarm).first(static_cast<std::size_t>(traits(kind).parameter_count))};
+      std::vector<float> far(cloud.count()), near(cloud.count());
+      EXPECT_OK(small->distances(model, far));
+      EXPECT_OK(evaluator().distances(model, near));
+      near[7 / static_cast<std::size_t>(cloud.dimension)] = far[7 / static_cast<std::size_t>(cloud.dimension)] = 0;  // NaN in both
+      EXPECT_EQ(far, near);
+      std::vector<std::uint16_t> far_labels(cloud.count()), near_labels(cloud.count());
+      EXPECT_OK(small->assign({&model, 1}, cloud.caps, far_labels));
+      EXPECT_OK(evaluator().assign({&model, 1}, cloud.caps, near_labels));
+      EXPECT_EQ(far_labels, near_labels);
+    }
+  }
+}
+
+TEST_P(VulkanDevices, StorageRangeHasABound) {
+  EvaluatorOptions options = GetParam().options;
+  options.max_storage_range = 100;
+  const auto made = make_vulkan_evaluator(options, "");
+  ASSERT_FALSE(made);
+  EXPECT_TRUE(is_invalid(tl::unexpected(made.error()), {"max_storage_range", "100", "16384"}));
+}
+
+TEST_P(VulkanDevices, UnknownNamesAreErrors) {
+  const auto made = make_vulkan_evaluator({}, "no such device");
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().kind, Failure::Kind::unavailable);
+  EXPECT_NE(made.error().message.find("no such device"), std::string::npos) << made.error().message;
+}
+
+TEST_P(VulkanDevices, ThePipelineCacheIsKeptAndNeverTrusted) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::path(testing::TempDir()) / "swarmfit-pipelines" / "inner";
+  fs::remove_all(folder);
+  EvaluatorOptions options = GetParam().options;
+  options.pipeline_cache = folder;
+  const Cloud cloud = make_cloud(ModelKind::plane, 500);
+  const std::vector<double> swarm = make_swarm(ModelKind::plane, 5);
+  const std::vector<float> expected = costs_of(*make(options), cloud, ModelKind::plane, swarm);
+
+  const auto files = [&] { return std::vector<fs::path>(fs::directory_iterator(folder), fs::directory_iterator()); };
+  ASSERT_EQ(files().size(), 1U);  // one file, and no draft beside it
+  const fs::path file = files()[0];
+  std::ifstream in(file, std::ios::binary);
+  const std::string good{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  ASSERT_GT(good.size(), 24U);
+
+  std::string flipped = good;
+  flipped[good.size() - 1] = static_cast<char>(flipped[good.size() - 1] ^ 1);
+  std::string foreign = good;
+  foreign[0] = 'x';
+  for (const std::string& bad : {std::string(), good.substr(0, good.size() / 2), flipped, foreign, good + "tail"}) {
+    std::ofstream(file, std::ios::binary | std::ios::trunc) << bad;
+    EXPECT_EQ(costs_of(*make(options), cloud, ModelKind::plane, swarm), expected);
+    std::ifstream again(file, std::ios::binary);
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(again), {}), good) << "not mended";
+  }
+  fs::remove_all(folder.parent_path());
+}
+
+TEST_P(VulkanDevices, MissingValidationIsAnError) {
+  setenv("VK_LAYER_PATH", "/nowhere", 1);
+  const auto made = make_vulkan_evaluator(GetParam().options, "");
+  unsetenv("VK_LAYER_PATH");
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().kind, Failure::Kind::unavailable);
+  EXPECT_NE(made.error().message.find("VK_LAYER_KHRONOS_validation"), std::string::npos) << made.error().message;
+}
+
+TEST(Backends, UnknownNamesListWhatThereIs) {
+  const auto made = make_evaluator("abacus", {});
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().kind, Failure::Kind::unavailable);
+  for (const char* word : {"abacus", "auto", "cpu", "vulkan", "reference"}) {
+    EXPECT_NE(made.error().message.find(word), std::string::npos) << made.error().message;
+  }
+}
+
+TEST(Backends, AutoNeverTakesSoftwareVulkan) {
+  const auto made = make_evaluator("auto", {});
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_FALSE(made->reason.empty());
+  if (made->evaluator->identity().backend != "vulkan") return;
+  for (const DeviceDescription& device : list_devices()) {
+    if (device.device == made->evaluator->identity().device) {
+      EXPECT_NE(device.kind, "software");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace swarmfit::kernels::conformance
