@@ -1,0 +1,39 @@
+// A frame's points as the perception works on them: single precision near a local origin, on the image grid where there is one.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <swarmfit/cloud.hpp>
+
+namespace swarmfit::perception {
+
+struct PointGrid {
+  int width = 0, height = 0;                          ///< height 1: no image grid
+  std::vector<Eigen::Vector3f> points;                ///< relative to `origin`; NaN where the sensor saw nothing
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();   ///< not zero only where the coordinates are too large for single precision
+  std::size_t finite = 0;
+  float pitch = 0;                                    ///< angle between neighbouring pixels [rad]; unorganised: 0
+
+  bool organised() const noexcept { return height > 1; }
+  std::size_t size() const noexcept { return points.size(); }
+  static bool seen(const Eigen::Vector3f& p) noexcept { return std::isfinite(p.x() + p.y() + p.z()); }
+  /// Distance from the camera, which an organised cloud has at its origin [m].
+  static float range(const Eigen::Vector3f& p) noexcept { return p.norm(); }
+};
+
+/// n . x + d = 0 in the grid's local frame, n towards up.
+struct LocalPlane {
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();
+  float offset = 0;
+  float height(const Eigen::Vector3f& p) const noexcept { return normal.dot(p) + offset; }
+};
+
+PointGrid make_grid(const Cloud& frame);
+
+}  // namespace swarmfit::perception

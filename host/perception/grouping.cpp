@@ -1,0 +1,232 @@
+#include "host/perception/grouping.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr double kFragmentCells = 60;    // smaller pieces are no objects of their own beside a larger one
+constexpr double kFragmentShare = 0.04;  // of the larger one's cells
+constexpr double kHollow = -0.2;         // divergence below which a piece is the inside of something
+constexpr float kRim = 0.03f;            // [m] inside and outside of a vessel are as high
+constexpr double kRimCells = 8;          // [cells] least border of a hollow and its shell
+constexpr int kRimReach = 5;             // [cells] holes the border may have
+constexpr double kEnclosed = 0.8;        // of a basin's border
+constexpr float kBelowRim = 0.01f;       // [m] a basin's top is at least this far below that of what encloses it
+constexpr float kSameSurface = 0.978f;   // cosine of 12 degrees
+constexpr float kOffSurface = 0.012f;    // [m]
+constexpr float kBridge = 0.35f;         // [m] between the middles of two pieces of one surface
+constexpr std::size_t kBridgeCells = 25; // smaller patches do not tell their surface
+constexpr float kInFront = 0.005f;       // [m]
+
+/// What a piece looks like as a whole.
+struct Piece {
+  std::size_t cells = 0;
+  Eigen::Vector3f centroid = Eigen::Vector3f::Zero();
+  double divergence = 0;  // of the normals, seen from above: > 0 a body, < 0 a hollow
+  float top = 0;          // [m] along up
+};
+
+class Assembly {
+ public:
+  Assembly(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const Eigen::Vector3f& up, std::vector<int> parent)
+      : grid_(grid), coarse_(coarse), patches_(patches), up_(up), parent_(std::move(parent)) {}
+
+  void absorb_fragments(const Contacts& contacts);
+  void close_hollows();
+  void bridge_occlusions();
+  const std::vector<int>& parent() const { return parent_; }
+
+ private:
+  int owner(std::size_t cell) const { return patches_.label[cell] == 0 ? -1 : parent_[patches_.label[cell] - 1u]; }
+  void join(int keep, int gone) {
+    for (auto& p : parent_)
+      if (p == gone) p = keep;
+  }
+  std::map<int, std::size_t> count_cells() const;
+  std::map<int, Piece> describe() const;
+  std::map<std::pair<int, int>, double> measure_borders() const;
+  bool continues(const Patch& a, const Patch& b) const;
+  bool hidden_between(std::size_t patch_a, std::size_t patch_b) const;
+
+  const PointGrid& grid_;
+  const CoarseGrid& coarse_;
+  const Patches& patches_;
+  Eigen::Vector3f up_;
+  std::vector<int> parent_;  // one a patch: the piece it belongs to
+};
+
+std::map<int, std::size_t> Assembly::count_cells() const {
+  std::map<int, std::size_t> cells;
+  for (std::size_t i = 0; i < parent_.size(); ++i) cells[parent_[i]] += patches_.list[i].cells;
+  return cells;
+}
+
+std::map<int, Piece> Assembly::describe() const {
+  std::map<int, Piece> pieces;
+  for (std::size_t i = 0; i < parent_.size(); ++i) {
+    auto& piece = pieces[parent_[i]];
+    piece.cells += patches_.list[i].cells;
+    piece.centroid += static_cast<float>(patches_.list[i].cells) * patches_.list[i].centroid;
+  }
+  for (auto& [number, piece] : pieces) piece.centroid /= static_cast<float>(std::max<std::size_t>(1, piece.cells));
+  struct Sums {
+    double along = 0, length = 0;
+    std::vector<float> heights;
+  };
+  std::vector<Sums> sums(parent_.size());
+  for (std::size_t at = 0; at < patches_.label.size(); ++at) {
+    const int o = owner(at);
+    if (o < 0) continue;
+    auto& sum = sums[static_cast<std::size_t>(o)];
+    sum.heights.push_back(up_.dot(coarse_.points[at]));
+    const Eigen::Vector3f d = coarse_.points[at] - pieces.at(o).centroid;
+    const Eigen::Vector3f n = coarse_.normals[at] - up_ * up_.dot(coarse_.normals[at]), flat = d - up_ * up_.dot(d);
+    sum.along += static_cast<double>(n.dot(flat));
+    sum.length += static_cast<double>(n.norm() * flat.norm());
+  }
+  for (auto& [number, piece] : pieces) {
+    auto& sum = sums[static_cast<std::size_t>(number)];
+    if (sum.heights.empty()) continue;
+    piece.divergence = sum.length > 0 ? sum.along / sum.length : 0;
+    const auto high = sum.heights.begin() + static_cast<std::ptrdiff_t>(sum.heights.size() * 95 / 100);
+    std::nth_element(sum.heights.begin(), high, sum.heights.end());
+    piece.top = *high;
+  }
+  return pieces;
+}
+
+/// Pieces too small to be told apart join the neighbour they touch most, the smallest first.
+void Assembly::absorb_fragments(const Contacts& contacts) {
+  while (true) {
+    const auto cells = count_cells();
+    std::map<std::pair<int, int>, double> touch;  // both ways
+    for (const auto& [pair, contact] : contacts) {
+      const int a = parent_[static_cast<std::size_t>(pair.first)], b = parent_[static_cast<std::size_t>(pair.second)];
+      if (a == b) continue;
+      touch[{a, b}] += contact.length;
+      touch[{b, a}] += contact.length;
+    }
+    std::pair<int, int> best{-1, -1};
+    double most = 0;
+    for (const auto& [pair, length] : touch) {
+      const auto size = cells.at(pair.first), larger = cells.at(pair.second);
+      if (size >= larger || static_cast<double>(size) >= std::max(kFragmentCells, kFragmentShare * static_cast<double>(larger))) continue;
+      const bool smaller = best.first < 0 || size < cells.at(best.first);
+      if (!smaller && (pair.first != best.first || length <= most)) continue;
+      best = pair;
+      most = length;
+    }
+    if (best.first < 0) return;
+    join(best.second, best.first);
+  }
+}
+
+/// Borders in the image between pieces, both ways; -1 is what is no piece.
+std::map<std::pair<int, int>, double> Assembly::measure_borders() const {
+  constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  std::map<std::pair<int, int>, double> borders;
+  const auto beside = [&](int u, int v, int o, int du, int dv) {
+    for (int reach = 1; reach <= kRimReach; ++reach) {
+      const int x = u + reach * du, y = v + reach * dv;
+      if (x < 0 || y < 0 || x >= coarse_.width || y >= coarse_.height) return -1;
+      const int other = owner(static_cast<std::size_t>(y * coarse_.width + x));
+      if (other >= 0) return other == o && reach > 1 ? -2 : other;
+    }
+    return -1;
+  };
+  for (int v = 0; v < coarse_.height; ++v)
+    for (int u = 0; u < coarse_.width; ++u) {
+      const int o = owner(static_cast<std::size_t>(v * coarse_.width + u));
+      if (o < 0) continue;
+      for (const auto& [du, dv] : kAround)
+        if (const int other = beside(u, v, o, du, dv); other != o && other != -2) borders[{o, other}] += 1;
+    }
+  return borders;
+}
+
+/// The inside of a pot or cup goes with its outside: a hollow has a shell beside it, as high; a basin lies within its rim.
+void Assembly::close_hollows() {
+  while (true) {
+    const auto pieces = describe();
+    const auto borders = measure_borders();
+    std::map<int, double> around;
+    for (const auto& [pair, length] : borders) around[pair.first] += length;
+    std::pair<int, int> best{-1, -1};
+    double most = kRimCells;
+    for (const auto& [pair, length] : borders) {
+      if (pair.second < 0 || length <= most) continue;
+      const auto &piece = pieces.at(pair.first), &other = pieces.at(pair.second);
+      const bool hollow = piece.divergence < kHollow && std::abs(piece.top - other.top) < kRim;
+      const bool basin = length > kEnclosed * around.at(pair.first) && piece.top < other.top - kBelowRim;
+      if (!hollow && !basin) continue;
+      most = length;
+      best = pair;
+    }
+    if (best.first < 0) return;
+    join(best.second, best.first);
+  }
+}
+
+/// Two patches that may be one surface.
+bool Assembly::continues(const Patch& a, const Patch& b) const {
+  if (a.cells < kBridgeCells || b.cells < kBridgeCells || a.normal.dot(b.normal) < kSameSurface) return false;
+  const Eigen::Vector3f d = a.centroid - b.centroid;
+  return d.norm() < kBridge && std::abs(d.dot(a.normal)) < kOffSurface && std::abs(d.dot(b.normal)) < kOffSurface;
+}
+
+/// Whether all that is seen between two patches lies in front of the surface that would join them.
+bool Assembly::hidden_between(std::size_t patch_a, std::size_t patch_b) const {
+  const auto &pa = patches_.list[patch_a], &pb = patches_.list[patch_b];
+  const int owner_a = parent_[patch_a], owner_b = parent_[patch_b];
+  const int steps = std::max(1, static_cast<int>((pb.middle - pa.middle).norm()));
+  int hidden = 0, open = 0;
+  for (int k = 0; k <= steps; ++k) {
+    const float t = static_cast<float>(k) / static_cast<float>(steps);
+    const Eigen::Vector2i q = (pa.middle + t * (pb.middle - pa.middle)).cast<int>();
+    const auto at = static_cast<std::size_t>(q.y() * coarse_.width + q.x());
+    const int o = owner(at);
+    if (o == owner_a || o == owner_b) continue;
+    const auto pixel = static_cast<std::size_t>(q.y() * coarse_.stride) * static_cast<std::size_t>(grid_.width) +
+                       static_cast<std::size_t>(q.x() * coarse_.stride);
+    const auto& p = o >= 0 ? coarse_.points[at] : grid_.points[pixel];
+    if (!PointGrid::seen(p)) continue;
+    // Along a line in the image the inverse of the depth of a plane is linear.
+    const float expected = 1 / ((1 - t) / pa.centroid.norm() + t / pb.centroid.norm());
+    ++(p.norm() < expected - kInFront ? hidden : open);
+  }
+  return hidden > 0 && open * 10 <= hidden;
+}
+
+/// Pieces of one thing to both sides of what stands before it.
+void Assembly::bridge_occlusions() {
+  for (std::size_t a = 0; a < patches_.list.size(); ++a)
+    for (std::size_t b = a + 1; b < patches_.list.size(); ++b) {
+      if (parent_[a] == parent_[b] || !continues(patches_.list[a], patches_.list[b]) || !hidden_between(a, b)) continue;
+      join(std::min(parent_[a], parent_[b]), std::max(parent_[a], parent_[b]));
+    }
+}
+
+}  // namespace
+
+Objects group_patches(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const GroupingOptions& options) {
+  const auto contacts = measure_contacts(grid, coarse, patches, options);
+  Assembly assembly(grid, coarse, patches, options.up, contract(patches.list.size(), contacts));
+  assembly.absorb_fragments(contacts);
+  assembly.close_hollows();
+  assembly.bridge_occlusions();
+  Objects objects;
+  std::vector<int> number(patches.list.size(), -1);
+  for (const int root : assembly.parent()) {
+    auto& n = number[static_cast<std::size_t>(root)];
+    if (n < 0) n = objects.count++;
+    objects.of_patch.push_back(n);
+  }
+  return objects;
+}
+
+}  // namespace swarmfit::perception

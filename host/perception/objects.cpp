@@ -1,0 +1,206 @@
+#include "host/perception/objects.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+#include <numeric>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr double kIslandShare = 0.9;    // of an island's border that one object holds
+constexpr int kIslandReach = 5;         // [cells] holes between an island and what encloses it
+constexpr int kIslandCells = 12;        // smaller ones are noise
+
+/// Object of the nearest cell around the point's own, in space; among cells of the point's group.
+std::uint16_t nearest_object(const CoarseGrid& coarse, const std::vector<std::uint16_t>& object, const Eigen::Vector3f& p,
+                             std::uint16_t group, int cu, int cv) {
+  float nearest = std::numeric_limits<float>::max();
+  std::uint16_t found = 0;
+  for (int v = std::max(0, cv - 1); v <= std::min(coarse.height - 1, cv + 1); ++v)
+    for (int u = std::max(0, cu - 1); u <= std::min(coarse.width - 1, cu + 1); ++u) {
+      const auto at = static_cast<std::size_t>(v * coarse.width + u);
+      if (object[at] == 0 || coarse.group[at] != group) continue;
+      const float distance = (coarse.points[at] - p).squaredNorm();
+      if (distance >= nearest) continue;
+      nearest = distance;
+      found = object[at];
+    }
+  return found;
+}
+
+/// Ritter's bounding sphere: at most a few percent larger than the least one.
+void bounding_sphere(const PointGrid& grid, const std::vector<std::uint32_t>& members, SpaceOfInterest& soi) {
+  const auto farthest = [&](const Eigen::Vector3f& from) {
+    std::size_t best = members.front();
+    for (const auto i : members)
+      if ((grid.points[i] - from).squaredNorm() > (grid.points[best] - from).squaredNorm()) best = i;
+    return grid.points[best];
+  };
+  const Eigen::Vector3f a = farthest(grid.points[members.front()]), b = farthest(a);
+  Eigen::Vector3d centre = (a + b).cast<double>() / 2;
+  double radius = static_cast<double>((a - b).norm()) / 2;
+  for (const auto i : members) {
+    const Eigen::Vector3d d = grid.points[i].cast<double>() - centre;
+    const double distance = d.norm();
+    if (distance <= radius) continue;
+    const double grown = (radius + distance) / 2;
+    centre += d * ((grown - radius) / distance);
+    radius = grown;
+  }
+  soi.centre = centre + grid.origin;
+  soi.radius = radius;
+}
+
+std::array<int, 4> bounding_box(const PointGrid& grid, const std::vector<std::uint32_t>& members) {
+  const auto width = static_cast<std::uint32_t>(grid.width);
+  int low_u = grid.width, high_u = -1, low_v = grid.height, high_v = -1;
+  for (const auto i : members) {
+    const int u = static_cast<int>(i % width), v = static_cast<int>(i / width);
+    low_u = std::min(low_u, u);
+    high_u = std::max(high_u, u);
+    low_v = std::min(low_v, v);
+    high_v = std::max(high_v, v);
+  }
+  return {low_u, low_v, high_u - low_u + 1, high_v - low_v + 1};
+}
+
+/// A frame seen through every stride-th pixel: which object, and what is support.
+struct Thumbnail {
+  int stride = 1, width = 0, height = 0;
+  std::vector<std::uint16_t> object;
+  std::vector<std::uint8_t> support;
+};
+
+Thumbnail shrink(const PointGrid& grid, const std::vector<std::uint8_t>& on_support, const ObjectLabels& objects) {
+  Thumbnail thumb;
+  thumb.stride = std::max(1, grid.width / 320);
+  thumb.width = grid.width / thumb.stride;
+  thumb.height = grid.height / thumb.stride;
+  for (int v = 0; v < thumb.height; ++v)
+    for (int u = 0; u < thumb.width; ++u) {
+      const auto i = static_cast<std::size_t>(v * thumb.stride) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u * thumb.stride);
+      thumb.object.push_back(objects.of_point[i]);
+      thumb.support.push_back(objects.of_point[i] == 0 && on_support[i] != 0);
+    }
+  return thumb;
+}
+
+/// The object that encloses the island, or 0. `island` marks the island's cells with `mark`.
+std::uint16_t enclosing(const Thumbnail& thumb, const std::vector<int>& island, int mark, const std::vector<std::uint32_t>& cells) {
+  constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  std::map<std::uint16_t, std::size_t> borders;  // 0: anything that is no object
+  std::size_t total = 0;
+  for (const auto at : cells) {
+    const int u0 = static_cast<int>(at) % thumb.width, v0 = static_cast<int>(at) / thumb.width;
+    for (const auto& [du, dv] : kAround) {
+      std::uint16_t met = 0;
+      bool inside = false;
+      for (int reach = 1; reach <= kIslandReach && met == 0 && !inside; ++reach) {
+        const int u = u0 + reach * du, v = v0 + reach * dv;
+        if (u < 0 || v < 0 || u >= thumb.width || v >= thumb.height) break;
+        const auto to = static_cast<std::size_t>(v * thumb.width + u);
+        inside = island[to] == mark;
+        met = thumb.object[to];
+      }
+      if (inside) continue;
+      ++borders[met];
+      ++total;
+    }
+  }
+  for (const auto& [object, length] : borders)
+    if (object != 0 && static_cast<double>(length) >= kIslandShare * static_cast<double>(total)) return object;
+  return 0;
+}
+
+}  // namespace
+
+ObjectLabels separate(const PointGrid& grid, const Popout& popout, const GroupingOptions& options) {
+  const auto coarse = make_coarse_grid(grid, popout);
+  const auto patches = grow_patches(coarse, grid.pitch);
+  const auto objects = group_patches(grid, coarse, patches, options);
+  ObjectLabels labels;
+  labels.support.assign(static_cast<std::size_t>(objects.count), 0);
+  for (std::size_t k = 0; k < patches.list.size(); ++k)
+    if (patches.list[k].cells > 0)
+      labels.support[static_cast<std::size_t>(objects.of_patch[k])] = popout.support[patches.list[k].group - 1u];
+  std::vector<std::uint16_t> of_cell(patches.label.size(), 0);
+  for (std::size_t at = 0; at < of_cell.size(); ++at)
+    if (patches.label[at] != 0) of_cell[at] = static_cast<std::uint16_t>(objects.of_patch[patches.label[at] - 1u] + 1);
+  labels.of_point.assign(grid.size(), 0);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    if (popout.group[i] == 0) continue;
+    const int cu = std::min(coarse.width - 1, static_cast<int>(i % static_cast<std::size_t>(grid.width)) / coarse.stride);
+    const int cv = std::min(coarse.height - 1, static_cast<int>(i / static_cast<std::size_t>(grid.width)) / coarse.stride);
+    labels.of_point[i] = nearest_object(coarse, of_cell, grid.points[i], popout.group[i], cu, cv);
+  }
+  return labels;
+}
+
+void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_support, ObjectLabels& objects) {
+  const auto thumb = shrink(grid, on_support, objects);
+  std::vector<std::size_t> size(objects.support.size() + 1, 0);
+  for (const auto o : thumb.object) ++size[o];
+  std::vector<int> island(thumb.object.size(), 0);
+  std::vector<std::uint16_t> filled(thumb.object.size(), 0);
+  std::vector<std::uint32_t> cells;
+  int islands = 0;
+  for (std::size_t seed = 0; seed < island.size(); ++seed) {
+    if (thumb.support[seed] == 0 || island[seed] != 0) continue;
+    island[seed] = ++islands;
+    cells.assign(1, static_cast<std::uint32_t>(seed));
+    for (std::size_t next = 0; next < cells.size(); ++next) {
+      const int u0 = static_cast<int>(cells[next]) % thumb.width, v0 = static_cast<int>(cells[next]) / thumb.width;
+      for (int v = std::max(0, v0 - 1); v <= std::min(thumb.height - 1, v0 + 1); ++v)
+        for (int u = std::max(0, u0 - 1); u <= std::min(thumb.width - 1, u0 + 1); ++u) {
+          const auto to = static_cast<std::size_t>(v * thumb.width + u);
+          if (thumb.support[to] == 0 || island[to] != 0) continue;
+          island[to] = islands;
+          cells.push_back(static_cast<std::uint32_t>(to));
+        }
+    }
+    if (static_cast<int>(cells.size()) < kIslandCells) continue;
+    const auto object = enclosing(thumb, island, islands, cells);
+    if (object == 0 || cells.size() > size[object]) continue;
+    for (const auto at : cells) filled[at] = object;
+  }
+  for (int v = 0; v < thumb.height * thumb.stride; ++v)
+    for (int u = 0; u < thumb.width * thumb.stride; ++u) {
+      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
+      const auto object = filled[static_cast<std::size_t>((v / thumb.stride) * thumb.width + u / thumb.stride)];
+      if (object != 0 && objects.of_point[i] == 0 && on_support[i] != 0) objects.of_point[i] = object;
+    }
+}
+
+std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const int> models, std::size_t min_points, double margin,
+                                         ObjectLabels& objects) {
+  std::vector<std::vector<std::uint32_t>> members(objects.support.size());
+  for (std::size_t i = 0; i < grid.size(); ++i)
+    if (objects.of_point[i] != 0) members[objects.of_point[i] - 1u].push_back(static_cast<std::uint32_t>(i));
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < members.size(); ++k)
+    if (members[k].size() >= std::max<std::size_t>(1, min_points)) order.push_back(k);
+  // What is large and near takes up most of the view.
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return members[a].size() > members[b].size(); });
+
+  std::vector<SpaceOfInterest> spaces;
+  std::vector<int> support;
+  std::vector<std::uint16_t> number(members.size() + 1, 0);
+  for (const auto k : order) {
+    SpaceOfInterest soi;
+    bounding_sphere(grid, members[k], soi);
+    soi.radius *= margin;
+    soi.points = members[k].size();
+    soi.plane = models[static_cast<std::size_t>(objects.support[k])];
+    if (grid.organised()) soi.bbox = bounding_box(grid, members[k]);
+    spaces.push_back(std::move(soi));
+    support.push_back(objects.support[k]);
+    number[k + 1] = static_cast<std::uint16_t>(spaces.size());
+  }
+  for (auto& o : objects.of_point) o = number[o];
+  objects.support = std::move(support);
+  return spaces;
+}
+
+}  // namespace swarmfit::perception

@@ -1,0 +1,198 @@
+#include "host/perception/patches.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr int kCoarseWidth = 320;       // [cells] fine enough for a cup's handle, coarse enough for a few milliseconds
+constexpr int kNormalRadius = 3;        // [cells]
+constexpr float kNormalReach = 2.2f;    // neighbours are within this many footprints times the radius: slanted faces are stretched
+constexpr std::size_t kFewNeighbours = 6;
+constexpr float kSameFace = 0.93f;      // cosine between a cell's normal and its patch's mean: 21.6 degrees
+constexpr std::size_t kSmallPatch = 12; // [cells]
+
+void average_blocks(const PointGrid& grid, const Popout& popout, CoarseGrid& coarse) {
+  for (int cv = 0; cv < coarse.height; ++cv)
+    for (int cu = 0; cu < coarse.width; ++cu) {
+      const auto at = static_cast<std::size_t>(cv * coarse.width + cu);
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero(), first = Eigen::Vector3f::Zero();
+      float count = 0, reach = 0;
+      for (int v = cv * coarse.stride; v < (cv + 1) * coarse.stride; ++v)
+        for (int u = cu * coarse.stride; u < (cu + 1) * coarse.stride; ++u) {
+          const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
+          if (popout.group[i] == 0) continue;
+          const auto& p = grid.points[i];
+          if (count == 0) {
+            first = p;
+            coarse.group[at] = popout.group[i];
+            reach = 4 * static_cast<float>(coarse.stride) * grid.pitch * p.norm();
+          } else if (popout.group[i] != coarse.group[at] || (p - first).squaredNorm() > reach * reach) {
+            continue;
+          }
+          sum += p;
+          ++count;
+        }
+      if (count > 0) coarse.points[at] = sum / count;
+    }
+}
+
+void estimate_normal(CoarseGrid& coarse, int cu, int cv, float pitch) {
+  const auto at = static_cast<std::size_t>(cv * coarse.width + cu);
+  const auto& p = coarse.points[at];
+  const float reach = kNormalReach * kNormalRadius * coarse.footprint(at, pitch);
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
+  std::size_t count = 0;
+  for (int v = std::max(0, cv - kNormalRadius); v <= std::min(coarse.height - 1, cv + kNormalRadius); ++v)
+    for (int u = std::max(0, cu - kNormalRadius); u <= std::min(coarse.width - 1, cu + kNormalRadius); ++u) {
+      const auto to = static_cast<std::size_t>(v * coarse.width + u);
+      if (coarse.group[to] != coarse.group[at]) continue;
+      const Eigen::Vector3f d = coarse.points[to] - p;
+      if (d.squaredNorm() > reach * reach) continue;
+      sum += d;
+      scatter.noalias() += d * d.transpose();
+      ++count;
+    }
+  if (count < kFewNeighbours) return;
+  scatter -= sum * sum.transpose() / static_cast<float>(count);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  solver.computeDirect(scatter);
+  Eigen::Vector3f n = solver.eigenvectors().col(0);
+  if (n.dot(p) > 0) n = -n;
+  coarse.normals[at] = n;
+  coarse.variation[at] = std::max(0.0f, solver.eigenvalues()[0]) / std::max(1e-12f, scatter.trace());
+}
+
+/// Breadth first from `seed`, over cells whose normal agrees with the patch's.
+void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, float pitch, Patches& patches, std::vector<std::uint32_t>& queue) {
+  queue.assign(1, static_cast<std::uint32_t>(seed));
+  patches.label[seed] = mark;
+  Eigen::Vector3f sum = coarse.normals[seed], mean = sum;
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    const std::size_t at = queue[next];
+    const int cu = static_cast<int>(at) % coarse.width, cv = static_cast<int>(at) / coarse.width;
+    const float reach = 5 * coarse.footprint(at, pitch);
+    for (int v = std::max(0, cv - 1); v <= std::min(coarse.height - 1, cv + 1); ++v)
+      for (int u = std::max(0, cu - 1); u <= std::min(coarse.width - 1, cu + 1); ++u) {
+        const auto to = static_cast<std::size_t>(v * coarse.width + u);
+        if (patches.label[to] != 0 || coarse.group[to] != coarse.group[seed] || coarse.normals[to].dot(mean) < kSameFace) continue;
+        if ((coarse.points[to] - coarse.points[at]).squaredNorm() > reach * reach) continue;
+        patches.label[to] = mark;
+        queue.push_back(static_cast<std::uint32_t>(to));
+        sum += coarse.normals[to];
+        mean = sum.normalized();
+      }
+  }
+}
+
+/// Cells of no patch, edges mostly, join the nearest patch of their group, ring by ring.
+void absorb_rest(const CoarseGrid& coarse, Patches& patches) {
+  std::vector<std::uint32_t> rest, still;
+  for (std::size_t at = 0; at < coarse.group.size(); ++at)
+    if (coarse.group[at] != 0 && patches.label[at] == 0) rest.push_back(static_cast<std::uint32_t>(at));
+  std::vector<std::uint16_t> choice(rest.size());
+  while (!rest.empty()) {
+    choice.assign(rest.size(), 0);
+    for (std::size_t k = 0; k < rest.size(); ++k) {
+      const std::size_t at = rest[k];
+      const int cu = static_cast<int>(at) % coarse.width, cv = static_cast<int>(at) / coarse.width;
+      float nearest = std::numeric_limits<float>::max();
+      for (int v = std::max(0, cv - 1); v <= std::min(coarse.height - 1, cv + 1); ++v)
+        for (int u = std::max(0, cu - 1); u <= std::min(coarse.width - 1, cu + 1); ++u) {
+          const auto to = static_cast<std::size_t>(v * coarse.width + u);
+          if (patches.label[to] == 0 || coarse.group[to] != coarse.group[at]) continue;
+          const float d = (coarse.points[to] - coarse.points[at]).squaredNorm();
+          if (d < nearest) {
+            nearest = d;
+            choice[k] = patches.label[to];
+          }
+        }
+    }
+    still.clear();
+    for (std::size_t k = 0; k < rest.size(); ++k) {
+      if (choice[k] != 0)
+        patches.label[rest[k]] = choice[k];
+      else
+        still.push_back(rest[k]);
+    }
+    if (still.size() == rest.size()) break;
+    rest.swap(still);
+  }
+}
+
+void describe(const CoarseGrid& coarse, Patches& patches) {
+  for (std::size_t at = 0; at < patches.label.size(); ++at) {
+    if (patches.label[at] == 0) continue;
+    auto& patch = patches.list[patches.label[at] - 1u];
+    patch.group = coarse.group[at];
+    ++patch.cells;
+    patch.centroid += coarse.points[at];
+    patch.normal += coarse.normals[at];
+    const auto width = static_cast<std::size_t>(coarse.width);
+    patch.middle += Eigen::Vector2f(static_cast<float>(at % width), static_cast<float>(at / width));
+  }
+  for (auto& patch : patches.list) {
+    if (patch.cells != 0) {
+      patch.centroid /= static_cast<float>(patch.cells);
+      patch.middle /= static_cast<float>(patch.cells);
+    }
+    if (patch.normal.squaredNorm() > 0) patch.normal.normalize();
+  }
+}
+
+}  // namespace
+
+CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout) {
+  CoarseGrid coarse;
+  coarse.stride = std::max(1, (grid.width + kCoarseWidth / 2) / kCoarseWidth);
+  coarse.width = grid.width / coarse.stride;
+  coarse.height = grid.height / coarse.stride;
+  const auto cells = static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height);
+  coarse.points.assign(cells, Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  coarse.normals.assign(cells, Eigen::Vector3f::Zero());
+  coarse.variation.assign(cells, 1);
+  coarse.group.assign(cells, 0);
+  average_blocks(grid, popout, coarse);
+  for (int v = 0; v < coarse.height; ++v)
+    for (int u = 0; u < coarse.width; ++u)
+      if (coarse.group[static_cast<std::size_t>(v * coarse.width + u)] != 0) estimate_normal(coarse, u, v, grid.pitch);
+  return coarse;
+}
+
+Patches grow_patches(const CoarseGrid& coarse, float pitch) {
+  Patches patches;
+  patches.label.assign(coarse.group.size(), 0);
+  std::vector<std::uint32_t> seeds, queue;
+  for (std::size_t at = 0; at < coarse.group.size(); ++at)
+    if (coarse.group[at] != 0 && coarse.normals[at].squaredNorm() > 0) seeds.push_back(static_cast<std::uint32_t>(at));
+  // The flattest neighbourhoods first: a patch should start in the middle of a face.
+  std::stable_sort(seeds.begin(), seeds.end(), [&](std::uint32_t a, std::uint32_t b) { return coarse.variation[a] < coarse.variation[b]; });
+  std::vector<std::uint8_t> tried(coarse.group.size(), 0);
+  for (const auto seed : seeds) {
+    if (patches.label[seed] != 0 || tried[seed] != 0 || patches.list.size() >= 65000) continue;
+    grow_one(coarse, seed, static_cast<std::uint16_t>(patches.list.size() + 1), pitch, patches, queue);
+    if (queue.size() >= kSmallPatch) {
+      patches.list.emplace_back();
+      continue;
+    }
+    for (const auto at : queue) patches.label[at] = 0;
+    tried[seed] = 1;
+  }
+  absorb_rest(coarse, patches);
+  // A group too small or too rough for any patch is one patch.
+  for (std::size_t at = 0; at < coarse.group.size(); ++at) {
+    if (coarse.group[at] == 0 || patches.label[at] != 0) continue;
+    patches.list.emplace_back();
+    const auto mark = static_cast<std::uint16_t>(patches.list.size());
+    for (std::size_t to = at; to < coarse.group.size(); ++to)
+      if (coarse.group[to] == coarse.group[at] && patches.label[to] == 0) patches.label[to] = mark;
+  }
+  describe(coarse, patches);
+  return patches;
+}
+
+}  // namespace swarmfit::perception

@@ -1,0 +1,232 @@
+#include "host/perception/popout.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <unordered_map>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr float kFringeSigmas = 3.0f;  // points this far above the plane are the foot of what stands on it
+constexpr float kSeedSigmas = 4.5f;    // a height that the plane's noise does not reach
+constexpr int kHole = 3;               // [px] at 640 columns: holes in the depth that the fill may jump
+constexpr float kNearCeiling = 0.93f;  // of max_height
+constexpr double kCutShare = 0.05;     // of a group's points near max_height: it goes on beyond, so it is a wall and no object
+constexpr double kCutLength = 0.3;     // the same where it is seen to go on: its cut edge over the square root of its size [px]
+constexpr double kBorderShare = 0.8;   // of a group's points over the edge of the surface
+constexpr float kBorderLength = 0.4f;  // [m] shorter things at the edge are things
+constexpr int kMostSurfaces = 127;
+
+/// For each point the surface right below it, and the height above it.
+void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result) {
+  result.above.assign(grid.size(), -1);
+  result.height.assign(grid.size(), 0);
+  const auto count = std::min<std::size_t>(surfaces.size(), kMostSurfaces);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const auto& p = grid.points[i];
+    if (!PointGrid::seen(p)) continue;
+    float lowest = static_cast<float>(options.max_height);
+    for (std::size_t s = 0; s < count; ++s) {
+      const float h = surfaces[s].plane.height(p);
+      // Within the noise of a surface counts as on it, so that a board is not taken for an object on the board below.
+      const float fringe = std::min(static_cast<float>(options.min_height), kFringeSigmas * surfaces[s].sigma(PointGrid::range(p)));
+      if (h < -fringe || h >= lowest || !surfaces[s].contains(p)) continue;
+      lowest = h;
+      result.above[i] = h > fringe ? static_cast<std::int8_t>(s) : std::int8_t{-1};
+      result.height[i] = h;
+    }
+  }
+}
+
+/// Grows one group from `seed` over the image grid. Points below `min_height` join but do not spread.
+class GridFlood {
+ public:
+  GridFlood(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result)
+      : grid_(grid), surfaces_(surfaces), options_(options), result_(result) {
+    const int hole = std::max(1, kHole * grid.width / 640);
+    int k = 0;
+    for (const int step : {1, hole + 1})
+      for (int dv = -1; dv <= 1; ++dv)
+        for (int du = -1; du <= 1; ++du)
+          if (du != 0 || dv != 0) offsets_[static_cast<std::size_t>(k++)] = {du * step, dv * step};
+  }
+
+  bool is_seed(std::size_t i) const {
+    if (result_.above[i] < 0) return false;
+    const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[i])];
+    return result_.height[i] >= std::max(static_cast<float>(options_.min_height),
+                                         kSeedSigmas * surface.sigma(PointGrid::range(grid_.points[i])));
+  }
+
+  /// Members of the group of `seed`, marked with `mark`.
+  const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
+    members_.assign(1, static_cast<std::uint32_t>(seed));
+    result_.group[seed] = mark;
+    for (std::size_t next = 0; next < members_.size(); ++next) {
+      const std::size_t at = members_[next];
+      if (!is_seed(at)) continue;
+      spread(at, mark);
+    }
+    return members_;
+  }
+
+ private:
+  void spread(std::size_t at, std::uint16_t mark) {
+    const int u = static_cast<int>(at % static_cast<std::size_t>(grid_.width)), v = static_cast<int>(at / static_cast<std::size_t>(grid_.width));
+    const auto& p = grid_.points[at];
+    const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[at])];
+    const float step = flood_step_at(grid_, surface.noise, options_.flood_step, PointGrid::range(p));
+    for (const auto& [du, dv] : offsets_) {
+      const int x = u + du, y = v + dv;
+      if (x < 0 || y < 0 || x >= grid_.width || y >= grid_.height) continue;
+      const auto to = static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.width) + static_cast<std::size_t>(x);
+      if (result_.above[to] != result_.above[at] || result_.group[to] != 0) continue;
+      if ((grid_.points[to] - p).squaredNorm() > step * step) continue;
+      if (!is_seed(to) && (du * du > 1 || dv * dv > 1)) continue;
+      result_.group[to] = mark;
+      members_.push_back(static_cast<std::uint32_t>(to));
+    }
+  }
+
+  const PointGrid& grid_;
+  std::span<const Surface> surfaces_;
+  const PopoutOptions& options_;
+  Popout& result_;
+  std::array<std::array<int, 2>, 16> offsets_{};
+  std::vector<std::uint32_t> members_;
+};
+
+/// The same without an image grid: neighbours come from a hash of voxels one step wide.
+class VoxelFlood {
+ public:
+  VoxelFlood(const PointGrid& grid, const PopoutOptions& options, Popout& result)
+      : grid_(grid), options_(options), result_(result), step_(static_cast<float>(options.flood_step)) {
+    for (std::size_t i = 0; i < grid.size(); ++i)
+      if (is_seed(i)) voxels_[key(cell(grid.points[i]))].push_back(static_cast<std::uint32_t>(i));
+  }
+
+  bool is_seed(std::size_t i) const { return result_.above[i] >= 0 && result_.height[i] >= static_cast<float>(options_.min_height); }
+
+  const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
+    members_.assign(1, static_cast<std::uint32_t>(seed));
+    result_.group[seed] = mark;
+    for (std::size_t next = 0; next < members_.size(); ++next) {
+      const std::size_t at = members_[next];
+      const auto& p = grid_.points[at];
+      const Eigen::Vector3i c = cell(p);
+      for (int dz = -1; dz <= 1; ++dz)
+        for (int dy = -1; dy <= 1; ++dy)
+          for (int dx = -1; dx <= 1; ++dx) visit(p, c + Eigen::Vector3i(dx, dy, dz), at, mark);
+    }
+    return members_;
+  }
+
+ private:
+  void visit(const Eigen::Vector3f& p, const Eigen::Vector3i& at_cell, std::size_t at, std::uint16_t mark) {
+    const auto found = voxels_.find(key(at_cell));
+    if (found == voxels_.end()) return;
+    auto& points = found->second;
+    // What has been reached leaves the voxel, so that each is looked at a bounded number of times.
+    std::size_t kept = 0;
+    for (const auto to : points) {
+      if (result_.group[to] != 0) continue;
+      if (result_.above[to] == result_.above[at] && (grid_.points[to] - p).squaredNorm() <= step_ * step_) {
+        result_.group[to] = mark;
+        members_.push_back(to);
+        continue;
+      }
+      points[kept++] = to;
+    }
+    points.resize(kept);
+  }
+  Eigen::Vector3i cell(const Eigen::Vector3f& p) const {
+    return (p / step_).array().floor().max(-1e6f).min(1e6f).cast<int>();
+  }
+  static std::uint64_t key(const Eigen::Vector3i& c) {
+    const auto part = [](int v) { return static_cast<std::uint64_t>(v + 1048576) & 0x1fffffu; };
+    return part(c.x()) << 42 | part(c.y()) << 21 | part(c.z());
+  }
+
+  const PointGrid& grid_;
+  const PopoutOptions& options_;
+  Popout& result_;
+  float step_;
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> voxels_;
+  std::vector<std::uint32_t> members_;
+};
+
+/// Along the edge of the surface, and long: the wall behind a table, its rim, a bench beside it.
+bool is_border(const PointGrid& grid, const Surface& surface, const std::vector<std::uint32_t>& members) {
+  std::size_t at_edge = 0;
+  Eigen::Vector2f low = Eigen::Vector2f::Constant(std::numeric_limits<float>::max()), high = -low;
+  for (const auto i : members) {
+    const auto& p = grid.points[i];
+    at_edge += surface.at_edge(p) ? 1 : 0;
+    const Eigen::Vector2f q(surface.axis_a.dot(p), surface.axis_b.dot(p));
+    low = low.cwiseMin(q);
+    high = high.cwiseMax(q);
+  }
+  return (high - low).norm() > kBorderLength && static_cast<double>(at_edge) > kBorderShare * static_cast<double>(members.size());
+}
+
+/// A thing that is cut off at max_height goes on above it: a wall, a curtain, a person.
+bool is_structure(const PointGrid& grid, const Surface& surface, const Popout& result, const std::vector<std::uint32_t>& members,
+                  const PopoutOptions& options) {
+  const auto ceiling = static_cast<float>(options.max_height);
+  if (!grid.organised()) {
+    const auto high = std::count_if(members.begin(), members.end(), [&](std::uint32_t i) { return result.height[i] > kNearCeiling * ceiling; });
+    return static_cast<double>(high) > kCutShare * static_cast<double>(members.size());
+  }
+  std::size_t cut = 0;
+  const auto width = static_cast<std::size_t>(grid.width);
+  for (const std::size_t i : members) {
+    if (result.height[i] < kNearCeiling * ceiling) continue;
+    const float step = flood_step_at(grid, surface.noise, options.flood_step, PointGrid::range(grid.points[i]));
+    const auto goes_on = [&](std::size_t to) {
+      return to < grid.size() && surface.plane.height(grid.points[to]) >= ceiling && (grid.points[to] - grid.points[i]).squaredNorm() <= step * step;
+    };
+    cut += goes_on(i - width) || goes_on(i + width) || goes_on(i - 1) || goes_on(i + 1) ? 1 : 0;
+  }
+  return static_cast<double>(cut) > kCutLength * std::sqrt(static_cast<double>(members.size()));
+}
+
+template <class Flood>
+void collect(Flood&& flood, const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result) {
+  constexpr std::uint16_t kDropped = 65535;
+  for (std::size_t seed = 0; seed < grid.size() && result.size.size() + 1 < kDropped; ++seed) {
+    if (result.group[seed] != 0 || !flood.is_seed(seed)) continue;
+    const auto mark = static_cast<std::uint16_t>(result.size.size() + 1);
+    const auto& members = flood.grow(seed, mark);
+    const auto& surface = surfaces[static_cast<std::size_t>(result.above[seed])];
+    if (members.size() >= options.min_points && !is_structure(grid, surface, result, members, options) &&
+        !is_border(grid, surface, members)) {
+      result.size.push_back(members.size());
+      result.support.push_back(result.above[seed]);
+    } else {
+      for (const auto i : members) result.group[i] = kDropped;
+    }
+  }
+  for (auto& g : result.group)
+    if (g == kDropped) g = 0;
+}
+
+}  // namespace
+
+float flood_step_at(const PointGrid& grid, double noise, double flood_step, float range) {
+  const float sampling = 3 * grid.pitch * range, jitter = 6 * static_cast<float>(noise) * range * range;
+  return std::max({static_cast<float>(flood_step), sampling, jitter});
+}
+
+Popout pop_out(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options) {
+  Popout result;
+  result.group.assign(grid.size(), 0);
+  find_floor_below(grid, surfaces, options, result);
+  if (grid.organised())
+    collect(GridFlood(grid, surfaces, options, result), grid, surfaces, options, result);
+  else
+    collect(VoxelFlood(grid, options, result), grid, surfaces, options, result);
+  return result;
+}
+
+}  // namespace swarmfit::perception

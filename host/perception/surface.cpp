@@ -1,0 +1,242 @@
+#include "host/perception/surface.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+
+#include <Eigen/Eigenvalues>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr float kCell = 0.02f;           // [m] finest cell
+constexpr int kMostCells = 512;          // along a side; a hall gets coarser cells
+constexpr float kGap = 0.12f;            // [m] parts of a plane this near are one surface: things stand in between and throw shadows
+constexpr float kEdge = 0.05f;           // [m] nearer to the hull is its edge
+constexpr int kUnbroken = 2;             // [cells] a piece has no wider gaps
+constexpr double kSplinter = 0.03;       // of the largest surface's area; smaller parts are none
+constexpr double kTopArea = 0.09;        // [m^2] the largest top of a thing that is carried
+constexpr double kTopLength = 0.45;      // [m] and its longest side
+constexpr double kReasonableArea = 0.01; // [m^2] nothing smaller carries anything
+constexpr float kNoiseAtOneMetre = 0.0015f;  // [m] where there are too few inliers to measure it
+
+using Points2 = std::vector<Eigen::Vector2f>;
+
+/// Andrew's monotone chain, counter-clockwise.
+Points2 convex_hull(Points2 points) {
+  const auto less = [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y()); };
+  std::sort(points.begin(), points.end(), less);
+  if (points.size() < 3) return points;
+  Points2 hull(2 * points.size());
+  std::size_t k = 0;
+  const auto turns_right = [&](const Eigen::Vector2f& p) {
+    const Eigen::Vector2f a = hull[k - 1] - hull[k - 2], b = p - hull[k - 2];
+    return a.x() * b.y() - a.y() * b.x() <= 0;
+  };
+  for (const auto& p : points) {
+    while (k >= 2 && turns_right(p)) --k;
+    hull[k++] = p;
+  }
+  const std::size_t lower = k + 1;
+  for (auto it = points.rbegin() + 1; it != points.rend(); ++it) {
+    while (k >= lower && turns_right(*it)) --k;
+    hull[k++] = *it;
+  }
+  hull.resize(k - 1);
+  return hull;
+}
+
+double polygon_area(const Points2& hull) {
+  double twice = 0;
+  for (std::size_t i = 0; i < hull.size(); ++i) {
+    const auto &a = hull[i], &b = hull[(i + 1) % hull.size()];
+    twice += static_cast<double>(a.x()) * b.y() - static_cast<double>(a.y()) * b.x();
+  }
+  return std::abs(twice) / 2;
+}
+
+/// Longest side along the principal axis.
+double principal_length(const Points2& points) {
+  Eigen::Vector2f mean = Eigen::Vector2f::Zero();
+  for (const auto& p : points) mean += p;
+  mean /= static_cast<float>(points.size());
+  Eigen::Matrix2f scatter = Eigen::Matrix2f::Zero();
+  for (const auto& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::Vector2f axis = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f>(scatter).eigenvectors().col(1);
+  float low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest();
+  for (const auto& p : points) {
+    low = std::min(low, axis.dot(p));
+    high = std::max(high, axis.dot(p));
+  }
+  return high - low;
+}
+
+/// Cells within `margin` of the convex polygon become 1, those well inside it 2.
+void fill_hull(const Points2& hull, float margin, Surface& surface) {
+  const auto depth_inside = [&](const Eigen::Vector2f& p) {
+    float depth = std::numeric_limits<float>::max();
+    for (std::size_t i = 0; i < hull.size() && depth >= -margin; ++i) {
+      const Eigen::Vector2f edge = hull[(i + 1) % hull.size()] - hull[i], to = p - hull[i];
+      depth = std::min(depth, (edge.x() * to.y() - edge.y() * to.x()) / edge.norm());
+    }
+    return depth;
+  };
+  for (int b = 0; b < surface.rows; ++b)
+    for (int a = 0; a < surface.columns; ++a) {
+      const Eigen::Vector2f centre =
+          surface.low + surface.cell * Eigen::Vector2f(static_cast<float>(a) + 0.5f, static_cast<float>(b) + 0.5f);
+      auto& cell = surface.extent[static_cast<std::size_t>(b * surface.columns + a)];
+      const float depth = depth_inside(centre);
+      if (depth >= -margin) cell = std::max<std::uint8_t>(cell, depth >= kEdge ? 2 : 1);
+    }
+}
+
+/// Groups of occupied cells with gaps of at most `reach` cells; 0 where nothing is, k the k-th group.
+std::vector<int> group_cells(const std::vector<int>& hits, int columns, int rows, int reach, int* groups) {
+  std::vector<int> group(hits.size(), 0), stack;
+  *groups = 0;
+  for (std::size_t seed = 0; seed < hits.size(); ++seed) {
+    if (hits[seed] == 0 || group[seed] != 0) continue;
+    group[seed] = ++*groups;
+    stack.assign(1, static_cast<int>(seed));
+    while (!stack.empty()) {
+      const int at = stack.back(), a0 = at % columns, b0 = at / columns;
+      stack.pop_back();
+      for (int b = std::max(0, b0 - reach); b <= std::min(rows - 1, b0 + reach); ++b)
+        for (int a = std::max(0, a0 - reach); a <= std::min(columns - 1, a0 + reach); ++a) {
+          const auto to = static_cast<std::size_t>(b * columns + a);
+          if (hits[to] == 0 || group[to] != 0) continue;
+          group[to] = *groups;
+          stack.push_back(static_cast<int>(to));
+        }
+    }
+  }
+  return group;
+}
+
+/// Centres of the cells of each group, in the plane's coordinates.
+std::vector<Points2> cells_by_group(const std::vector<int>& group, int groups, const Surface& surface) {
+  std::vector<Points2> cells(static_cast<std::size_t>(groups));
+  const auto columns = static_cast<std::size_t>(surface.columns);
+  for (std::size_t at = 0; at < group.size(); ++at)
+    if (group[at] != 0)
+      cells[static_cast<std::size_t>(group[at] - 1)].push_back(
+          surface.low + surface.cell * Eigen::Vector2f(static_cast<float>(at % columns) + 0.5f, static_cast<float>(at / columns) + 0.5f));
+  return cells;
+}
+
+/// Cells of the largest piece without gaps.
+Points2 largest_piece(const std::vector<int>& hits, const Surface& surface) {
+  int groups = 0;
+  const auto group = group_cells(hits, surface.columns, surface.rows, kUnbroken, &groups);
+  auto cells = cells_by_group(group, groups, surface);
+  return *std::max_element(cells.begin(), cells.end(), [](const Points2& a, const Points2& b) { return a.size() < b.size(); });
+}
+
+void lay_out_cells(const PointGrid& grid, const std::vector<std::uint32_t>& members, double margin, Surface& surface) {
+  Eigen::Vector2f low = Eigen::Vector2f::Constant(std::numeric_limits<float>::max()), high = -low;
+  for (const auto i : members) {
+    const Eigen::Vector2f q(surface.axis_a.dot(grid.points[i]), surface.axis_b.dot(grid.points[i]));
+    low = low.cwiseMin(q);
+    high = high.cwiseMax(q);
+  }
+  const auto pad = static_cast<float>(margin);
+  surface.low = low - Eigen::Vector2f::Constant(pad);
+  const Eigen::Vector2f size = high - low + Eigen::Vector2f::Constant(2 * pad);
+  surface.cell = std::max(kCell, size.maxCoeff() / kMostCells);
+  surface.columns = static_cast<int>(size.x() / surface.cell) + 1;
+  surface.rows = static_cast<int>(size.y() / surface.cell) + 1;
+}
+
+/// Heights of the inliers over range^2, robustly.
+double measure_noise(const PointGrid& grid, const std::vector<std::uint32_t>& members, const LocalPlane& plane) {
+  std::vector<float> scaled;
+  const std::size_t step = std::max<std::size_t>(1, members.size() / 5000);
+  for (std::size_t k = 0; k < members.size(); k += step) {
+    const auto& p = grid.points[members[k]];
+    scaled.push_back(std::abs(plane.height(p)) / std::max(0.25f, p.squaredNorm()));
+  }
+  if (scaled.size() < 50 || !grid.organised()) return kNoiseAtOneMetre;
+  const auto middle = scaled.begin() + static_cast<std::ptrdiff_t>(scaled.size() / 2);
+  std::nth_element(scaled.begin(), middle, scaled.end());
+  return 1.4826 * static_cast<double>(*middle);
+}
+
+/// The larger surface that `small` lies above, within its extent; -1 none.
+bool rests_on(const Surface& small, const Surface& large, double max_height) {
+  std::size_t over = 0, cells = 0;
+  double rise = 0;
+  for (int b = 0; b < small.rows; ++b)
+    for (int a = 0; a < small.columns; ++a) {
+      if (small.component[static_cast<std::size_t>(b * small.columns + a)] == 0) continue;
+      const Eigen::Vector3f p = -small.plane.offset * small.plane.normal +
+                                (small.low.x() + (static_cast<float>(a) + 0.5f) * small.cell) * small.axis_a +
+                                (small.low.y() + (static_cast<float>(b) + 0.5f) * small.cell) * small.axis_b;
+      ++cells;
+      over += large.contains(p) ? 1 : 0;
+      rise += static_cast<double>(large.plane.height(p));
+    }
+  if (cells == 0) return false;
+  rise /= static_cast<double>(cells);
+  return 2 * over > cells && rise > 0 && rise < max_height;
+}
+
+}  // namespace
+
+Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> labels, int model, const LocalPlane& plane, double margin) {
+  Surface surface;
+  surface.plane = plane;
+  surface.model = model;
+  surface.axis_a = plane.normal.unitOrthogonal();
+  surface.axis_b = plane.normal.cross(surface.axis_a);
+  std::vector<std::uint32_t> members;
+  for (std::size_t i = 0; i < grid.size(); ++i)
+    if (labels[i] == model && PointGrid::seen(grid.points[i])) members.push_back(static_cast<std::uint32_t>(i));
+  surface.noise = measure_noise(grid, members, plane);
+  if (members.empty()) return surface;
+  lay_out_cells(grid, members, margin, surface);
+
+  std::vector<int> hits(static_cast<std::size_t>(surface.columns) * static_cast<std::size_t>(surface.rows), 0);
+  for (const auto i : members)
+    if (const int at = surface.cell_of(grid.points[i]); at >= 0) ++hits[static_cast<std::size_t>(at)];
+  int groups = 0;
+  const auto group = group_cells(hits, surface.columns, surface.rows, std::max(1, static_cast<int>(kGap / surface.cell)), &groups);
+
+  const auto cells = cells_by_group(group, groups, surface);
+  std::size_t largest = 0;
+  for (const auto& part : cells) largest = std::max(largest, part.size());
+  surface.extent.assign(hits.size(), 0);
+  surface.component.assign(hits.size(), 0);
+  const double cell_area = static_cast<double>(surface.cell) * static_cast<double>(surface.cell);
+  std::vector<bool> kept(cells.size());
+  for (std::size_t g = 0; g < cells.size(); ++g) {
+    kept[g] = static_cast<double>(cells[g].size()) >= kSplinter * static_cast<double>(largest);
+    if (!kept[g]) continue;
+    const auto hull = convex_hull(cells[g]);
+    if (hull.size() >= 3) fill_hull(hull, static_cast<float>(margin), surface);
+    surface.area += cell_area * static_cast<double>(cells[g].size());
+  }
+  const auto piece = largest_piece(hits, surface);
+  surface.piece_area = polygon_area(convex_hull(piece));
+  surface.piece_length = principal_length(piece);
+  for (std::size_t at = 0; at < group.size(); ++at) surface.component[at] = group[at] != 0 && kept[static_cast<std::size_t>(group[at] - 1)];
+  return surface;
+}
+
+std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double max_height) {
+  std::vector<bool> supporting(surfaces.size(), false);
+  std::vector<std::size_t> by_area(surfaces.size());
+  std::iota(by_area.begin(), by_area.end(), std::size_t{0});
+  std::stable_sort(by_area.begin(), by_area.end(), [&](std::size_t a, std::size_t b) { return surfaces[a].area > surfaces[b].area; });
+  for (const auto i : by_area) {
+    if (surfaces[i].area < kReasonableArea) continue;
+    const bool small = surfaces[i].piece_area < kTopArea && surfaces[i].piece_length < kTopLength;
+    supporting[i] = true;
+    for (std::size_t j = 0; j < surfaces.size() && small; ++j)
+      if (supporting[j] && surfaces[j].area > 2 * surfaces[i].area && rests_on(surfaces[i], surfaces[j], max_height)) supporting[i] = false;
+  }
+  return supporting;
+}
+
+}  // namespace swarmfit::perception

@@ -1,0 +1,50 @@
+// The extent of a supporting plane: where on the infinite plane there is something to stand on.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/perception/grid.hpp"
+
+namespace swarmfit::perception {
+
+/// One plane's surfaces as a bitmap in the plane's own coordinates. A plane may carry several (two tables of one height).
+struct Surface {
+  LocalPlane plane;
+  int model = 0;                            ///< 1-based index into the fit's models
+  Eigen::Vector3f axis_a = Eigen::Vector3f::UnitX(), axis_b = Eigen::Vector3f::UnitY();
+  Eigen::Vector2f low = Eigen::Vector2f::Zero();
+  float cell = 0;                           ///< [m]
+  int columns = 0, rows = 0;
+  std::vector<std::uint8_t> extent;         ///< 2 well within a surface's hull, 1 at its edge and in the margin, row after row
+  std::vector<std::uint8_t> component;      ///< 1 on cells of a kept surface, without the hull; what is connected with the plane
+  double area = 0;                          ///< seen by the sensor, all kept surfaces [m^2]
+  double piece_area = 0;                    ///< hull of the largest unbroken piece [m^2]
+  double piece_length = 0;                  ///< of that piece, along its principal axis [m]
+  double noise = 0;                         ///< standard deviation of the inliers' heights at a range of one metre; grows with range^2
+
+  int cell_of(const Eigen::Vector3f& p) const noexcept {
+    const int a = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell));
+    const int b = static_cast<int>(std::floor((axis_b.dot(p) - low.y()) / cell));
+    return a < 0 || b < 0 || a >= columns || b >= rows ? -1 : b * columns + a;
+  }
+  bool contains(const Eigen::Vector3f& p) const noexcept {
+    const int at = cell_of(p);
+    return at >= 0 && extent[static_cast<std::size_t>(at)] != 0;
+  }
+  bool at_edge(const Eigen::Vector3f& p) const noexcept {
+    const int at = cell_of(p);
+    return at < 0 || extent[static_cast<std::size_t>(at)] < 2;
+  }
+  /// Standard deviation of a height measured at this range.
+  float sigma(float range) const noexcept { return static_cast<float>(noise) * std::max(0.25f, range * range); }
+};
+
+/// `labels[i] == model` marks the plane's points. `margin` [m] widens the hull.
+Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> labels, int model, const LocalPlane& plane, double margin);
+
+/// Which surfaces support: of reasonable size, and not the top of a thing that stands on a larger one.
+std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double max_height);
+
+}  // namespace swarmfit::perception

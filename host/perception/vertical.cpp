@@ -1,0 +1,92 @@
+#include "host/perception/vertical.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr double kRises = 0.12;       // a plane whose normal leans this far to the image's top is seen from above: a floor or a table
+constexpr double kWallWeight = 0.2;   // one that faces the camera may be a wall as well as a table seen from straight above
+constexpr double kCeilingWeight = 0.02;
+constexpr double kLeans = 0.5;        // across the image; cameras are seldom rolled
+constexpr double kLeanWeight = 0.2;
+
+/// Where the image's right and its bottom lie in the cloud's frame; empty without an image grid.
+struct ImageAxes {
+  Eigen::Vector3d right, down;
+};
+
+std::optional<ImageAxes> image_axes(const PointGrid& grid) {
+  if (!grid.organised()) return std::nullopt;
+  Eigen::Vector3d right = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
+  const int du = std::max(1, grid.width / 16), dv = std::max(1, grid.height / 16);
+  const auto ray = [&](int u, int v) -> Eigen::Vector3d {
+    return grid.points[static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u)].cast<double>().normalized();
+  };
+  for (int v = 0; v + dv < grid.height; v += 4)
+    for (int u = 0; u + du < grid.width; u += 4) {
+      const Eigen::Vector3d here = ray(u, v), beside = ray(u + du, v), below = ray(u, v + dv);
+      if (beside.allFinite() && here.allFinite()) right += beside - here;
+      if (below.allFinite() && here.allFinite()) down += below - here;
+    }
+  if (right.norm() < 1e-9 || down.norm() < 1e-9) return std::nullopt;
+  return ImageAxes{right.normalized(), down.normalized()};
+}
+
+/// Normal towards the camera.
+Eigen::Vector3d facing(const PointGrid& grid, const Model& plane) {
+  const double at_camera = plane.offset() + (grid.organised() ? 0.0 : plane.normal().dot(Eigen::Vector3d::Zero()));
+  return at_camera >= 0 ? plane.normal() : Eigen::Vector3d(-plane.normal());
+}
+
+double plausibility(const Eigen::Vector3d& normal, const std::optional<ImageAxes>& axes) {
+  if (!axes) return 1;
+  const double rise = -normal.dot(axes->down), lean = std::abs(normal.dot(axes->right));
+  const double weight = rise > kRises ? 1 : rise > -kRises ? kWallWeight : kCeilingWeight;
+  return lean < kLeans ? weight : weight * kLeanWeight;
+}
+
+}  // namespace
+
+Vertical vertical_from_gravity(const Eigen::Vector3d& gravity) { return {-gravity.normalized(), "gravity"}; }
+
+Vertical vertical_from_tilt(double tilt) { return {Eigen::Vector3d(0, -std::cos(tilt), -std::sin(tilt)), "camera tilt"}; }
+
+std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, double horizontal_angle) {
+  if (planes.empty()) return std::nullopt;
+  const auto axes = image_axes(grid);
+  std::vector<Eigen::Vector3d> normals;
+  std::vector<double> weights;
+  for (const auto& plane : planes) {
+    normals.push_back(facing(grid, plane));
+    weights.push_back(static_cast<double>(plane.inliers) * plausibility(normals.back(), axes));
+  }
+  std::size_t best = 0;
+  double most = -1;
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    double shared = 0;
+    for (std::size_t j = 0; j < normals.size(); ++j)
+      if (std::abs(normals[i].dot(normals[j])) > std::cos(horizontal_angle)) shared += weights[j];
+    // Of the planes of one direction, the largest tells it best.
+    if (shared > most || (shared == most && weights[i] > weights[best])) {
+      most = shared;
+      best = i;
+    }
+  }
+  const Eigen::Vector3d normal = normals[best];
+  if (axes && std::abs(normal.dot(axes->down)) < kRises) {
+    const bool sideways = std::abs(normal.dot(axes->right)) >= kLeans;
+    bool only_walls = true;
+    for (std::size_t i = 0; i < normals.size(); ++i) only_walls = only_walls && std::abs(normals[i].dot(axes->down)) < 0.5;
+    if (sideways || (planes.size() > 1 && only_walls)) {
+      const Eigen::Vector3d up = -axes->down + normal * normal.dot(axes->down);
+      return Vertical{up.normalized(), "dominant plane (a wall)"};
+    }
+  }
+  return Vertical{normal, "dominant plane"};
+}
+
+}  // namespace swarmfit::perception

@@ -1,0 +1,31 @@
+// Which way is up: from gravity, from the camera's tilt, or from the planes of the first view.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include <Eigen/Core>
+
+#include <swarmfit/model.hpp>
+
+#include "host/perception/grid.hpp"
+
+namespace swarmfit::perception {
+
+struct Vertical {
+  Eigen::Vector3d up = Eigen::Vector3d::Zero();  ///< unit, against gravity
+  std::string source;
+};
+
+Vertical vertical_from_gravity(const Eigen::Vector3d& gravity);
+
+/// x right, y down, z forward; `tilt` [rad] below the horizon.
+Vertical vertical_from_tilt(double tilt);
+
+/// The direction that the planes of the view share most: each plane counts with its points, less where no upright camera could see
+/// a floor or a table like that. Where only walls are seen, the image's vertical made perpendicular to the largest of them.
+/// Empty where there is no plane.
+std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, double horizontal_angle);
+
+}  // namespace swarmfit::perception

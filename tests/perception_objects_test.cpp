@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include "host/perception/objects.hpp"
+#include "tests/perception_fixture.hpp"
+
+namespace swarmfit::perception {
+namespace {
+
+struct Scene {
+  test::Rendering rendering;
+  PointGrid grid;
+  Popout popout;
+  ObjectLabels objects;
+};
+
+Scene perceive(const std::vector<test::Box>& boxes) {
+  Scene scene{test::render_table(boxes, 0.0015, 640, 480), {}, {}, {}};
+  scene.grid = make_grid(scene.rendering.cloud);
+  const std::vector<Surface> surfaces{make_surface(scene.grid, scene.rendering.table_labels(), 1, scene.rendering.table(), 0.02)};
+  scene.popout = pop_out(scene.grid, surfaces, {});
+  scene.objects = separate(scene.grid, scene.popout, {0.02, surfaces[0].noise, scene.rendering.table().normal});
+  return scene;
+}
+
+void expect_objects(const Scene& scene, int count) {
+  ASSERT_EQ(scene.objects.support.size(), static_cast<std::size_t>(count));
+  std::vector<std::uint16_t> labels;
+  for (int k = 0; k < count; ++k) {
+    const auto match = test::agreement(scene.rendering.truth, static_cast<std::uint16_t>(2 + k), scene.objects.of_point);
+    EXPECT_GT(match.recall, 0.9) << "box " << k;
+    EXPECT_GT(match.precision, 0.95) << "box " << k;
+    EXPECT_EQ(std::count(labels.begin(), labels.end(), match.label), 0) << "box " << k << " shares a label";
+    labels.push_back(match.label);
+  }
+}
+
+TEST(Objects, OneBoxIsOneObject) { expect_objects(perceive({{{0, 0, 0.08}, {0.12, 0.07, 0.08}, 0.4}}), 1); }
+
+TEST(Objects, AStackIsTakenApart) {
+  const auto scene = perceive({{{0, 0, 0.05}, {0.14, 0.12, 0.05}, 0.2}, {{0.02, 0.03, 0.15}, {0.07, 0.06, 0.05}, 0.9}});
+  EXPECT_EQ(scene.popout.size.size(), 1u);
+  expect_objects(scene, 2);
+}
+
+TEST(Objects, BoxesThatTouchAreTakenApart) {
+  const auto scene = perceive({{{-0.08, 0, 0.1}, {0.08, 0.05, 0.1}, 0.5}, {{0.08, -0.06, 0.06}, {0.08, 0.05, 0.06}, -0.6}});
+  expect_objects(scene, 2);
+}
+
+TEST(Objects, ABoxIsOneToBothSidesOfWhatStandsBeforeIt) {
+  const auto scene = perceive({{{0, 0.1, 0.06}, {0.22, 0.04, 0.06}}, {{0, -0.12, 0.2}, {0.05, 0.03, 0.2}}});
+  EXPECT_EQ(scene.popout.size.size(), 3u);
+  expect_objects(scene, 2);
+}
+
+TEST(Objects, TwoBoxesInLineWithAGapBetweenStayTwo) {
+  expect_objects(perceive({{{-0.15, 0, 0.06}, {0.1, 0.04, 0.06}}, {{0.15, 0, 0.06}, {0.1, 0.04, 0.06}}}), 2);
+}
+
+TEST(Objects, TheFloorOfAVesselJoinsIt) {
+  // Four walls around a piece of table.
+  const auto scene = perceive({{{0, -0.1, 0.05}, {0.15, 0.005, 0.05}},
+                               {{0, 0.2, 0.05}, {0.15, 0.005, 0.05}},
+                               {{-0.15, 0.05, 0.05}, {0.005, 0.155, 0.05}},
+                               {{0.15, 0.05, 0.05}, {0.005, 0.155, 0.05}}});
+  ObjectLabels one{std::vector<std::uint16_t>(scene.grid.size(), 0), {0}};
+  for (std::size_t i = 0; i < scene.grid.size(); ++i) one.of_point[i] = scene.rendering.truth[i] >= 2;
+  std::vector<std::uint8_t> on_support(scene.grid.size(), 0);
+  for (std::size_t i = 0; i < on_support.size(); ++i) on_support[i] = scene.rendering.truth[i] == 1;
+  const auto before = one.of_point;
+  fill_basins(scene.grid, on_support, one);
+  std::size_t joined = 0, inside = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (before[i] != 0 || on_support[i] == 0) continue;
+    // The world's axes: x is the camera's, y follows from the height and the depth.
+    const auto& p = scene.grid.points[i];
+    const Eigen::Vector3d back = scene.rendering.up.cross(Eigen::Vector3d(1, 0, 0));
+    const double y = back.dot(p.cast<double>()) - 1;
+    const bool within = std::abs(p.x()) < 0.14 && y > -0.09 && y < 0.19;
+    inside += within;
+    if (within) joined += one.of_point[i] == 1;
+    if (std::abs(p.x()) > 0.2 || y < -0.15 || y > 0.45) {
+      ASSERT_EQ(one.of_point[i], 0) << "x " << p.x() << " y " << y;
+    }
+  }
+  ASSERT_GT(inside, 1000u);
+  EXPECT_GT(static_cast<double>(joined), 0.95 * static_cast<double>(inside));
+}
+
+TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {
+  auto scene = perceive({{{-0.3, 0, 0.03}, {0.03, 0.03, 0.03}}, {{0.25, 0.1, 0.1}, {0.1, 0.05, 0.1}, 0.6}});
+  const std::vector<int> models{3};
+  auto labels = scene.objects;
+  const auto spaces = make_spaces(scene.grid, models, 100, 1.2, labels);
+  ASSERT_EQ(spaces.size(), 2u);
+  EXPECT_GT(spaces[0].points, spaces[1].points);
+  const auto large = test::agreement(scene.rendering.truth, 3, labels.of_point);
+  EXPECT_EQ(large.label, 1);
+  for (std::size_t i = 0; i < labels.of_point.size(); ++i) {
+    if (labels.of_point[i] == 0) continue;
+    const auto& soi = spaces[labels.of_point[i] - 1u];
+    ASSERT_LE((scene.grid.points[i].cast<double>() - soi.centre).norm(), soi.radius);
+    const int u = static_cast<int>(i % 640), v = static_cast<int>(i / 640);
+    ASSERT_TRUE(u >= soi.bbox[0] && u < soi.bbox[0] + soi.bbox[2] && v >= soi.bbox[1] && v < soi.bbox[1] + soi.bbox[3]);
+    EXPECT_EQ(soi.plane, 3);
+  }
+  EXPECT_LT(spaces[0].radius, 1.2 * 1.25 * std::sqrt(0.01 + 0.0025 + 0.01));
+  EXPECT_TRUE(make_spaces(scene.grid, models, 1000000, 1.2, labels).empty());
+  EXPECT_EQ(std::count(labels.of_point.begin(), labels.of_point.end(), 0), static_cast<std::ptrdiff_t>(labels.of_point.size()));
+}
+
+}  // namespace
+}  // namespace swarmfit::perception
