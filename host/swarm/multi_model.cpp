@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/swarm/deflation.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/swarm.hpp"
@@ -141,11 +142,7 @@ Expected<bool> MultiModel::accept(const models::Position& theta, double loss, co
 }
 
 Expected<> MultiModel::deflate(std::span<const float> distances) {
-  const auto slope = static_cast<float>(settings_.dead_zone_slope);
-  for (std::size_t i = 0; i < caps_.size(); ++i) {
-    if (std::isnan(distances[i])) continue;
-    caps_[i] = std::min(caps_[i], std::max(0.0F, slope * (distances[i] - tau_[i])));
-  }
+  swarm::deflate(distances, tau_, tail_reach(distances, caps_, tau_), settings_.dead_zone_slope, caps_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   if (auto done = evaluator_.set_caps(caps_); !done) return tl::unexpected(to_error(done.error()));
   return {};

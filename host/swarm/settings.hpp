@@ -28,7 +28,7 @@ struct Settings {
   double still = 0;                  ///< a global best that gains less than this share of the saving has not moved
   Deflation deflation = Deflation::residual;
   double lambda = 10;                ///< Eq. (5)
-  double dead_zone_slope = 0.5;      ///< kappa of design 2.1
+  double dead_zone_slope = 2;        ///< kappa of design 2.1: how fast caps rise beyond the dead zone
   Loss loss = Loss::truncated_l1;
   int patience = 2;                  ///< swarms in a row whose best does not pay before the fit ends
   bool refine = true;                ///< least squares on the inliers of what converged
