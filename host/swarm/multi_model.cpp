@@ -151,6 +151,7 @@ Expected<> MultiModel::deflate(std::span<const float> distances) {
 Expected<> MultiModel::finish(FitResult& result) {
   if (settings_.joint && !found_.empty() && !limits_.stop.stop_requested()) {
     const Ground ground{evaluator_, space_, points_, tau_};
+    if (auto done = polish(ground); !done) return done;
     if (auto energy = refine_jointly(ground, found_); !energy) return tl::unexpected(energy.error());
     if (auto done = drop_unpaid(result); !done) return done;
     for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
@@ -160,6 +161,19 @@ Expected<> MultiModel::finish(FitResult& result) {
   result.evaluations = static_cast<std::size_t>(effort.evaluations);
   result.points_touched = effort.point_models > 0 ? static_cast<double>(effort.touched) / static_cast<double>(effort.point_models) : 1.0;
   return describe(result);
+}
+
+Expected<> MultiModel::polish(const Ground& ground) {
+  // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs.
+  std::vector<float> full = tau_;
+  for (std::size_t i = 0; i < full.size(); ++i) full[i] = points_.finite(i) ? tau_[i] : 0.0F;
+  if (auto done = evaluator_.set_caps(full); !done) return tl::unexpected(to_error(done.error()));
+  for (models::Position& theta : found_) {
+    auto loss = landscape_.loss(theta);
+    if (!loss) return tl::unexpected(loss.error());
+    if (auto done = refine_one(ground, landscape_, full, theta, *loss); !done) return done;
+  }
+  return {};
 }
 
 Expected<> MultiModel::drop_unpaid(FitResult& result) {

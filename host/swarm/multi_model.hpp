@@ -41,6 +41,7 @@ class MultiModel {
   Expected<bool> accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate(std::span<const float> distances);
   Expected<> finish(FitResult& result);
+  Expected<> polish(const Ground& ground);
   Expected<> drop_unpaid(FitResult& result);
   Expected<> label(FitResult& result);
   Expected<> describe(FitResult& result);

@@ -28,19 +28,14 @@ void weights(const Ground& ground, std::span<const std::uint32_t> index, std::sp
   }
 }
 
-/// Distances of every model; nearest model of each point (models.size() if none within tau) and the joint energy.
-Expected<double> nearest(const Ground& ground, const std::vector<models::Position>& models, std::vector<std::size_t>& owner,
-                         std::vector<float>& least) {
+/// Sum over points of the distance to the nearest model, at most tau.
+Expected<double> joint_energy(const Ground& ground, const std::vector<models::Position>& models) {
   std::vector<float> distances;
-  least.assign(ground.tau.begin(), ground.tau.end());
-  owner.assign(ground.points.size(), models.size());
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
+  std::vector<float> least(ground.tau.begin(), ground.tau.end());
+  for (const models::Position& model : models) {
+    if (auto done = measure(ground, model, distances); !done) return tl::unexpected(done.error());
     for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] < least[i]) {
-        least[i] = distances[i];
-        owner[i] = m;
-      }
+      if (distances[i] < least[i]) least[i] = distances[i];
     }
   }
   double energy = 0;
@@ -76,28 +71,27 @@ Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<cons
 }
 
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models) {
-  std::vector<std::size_t> owner, next;
-  std::vector<float> least, next_least;
+  std::vector<float> distances;
+  std::vector<std::uint32_t> index;
   std::vector<double> weight;
-  auto energy = nearest(ground, models, owner, least);
+  auto energy = joint_energy(ground, models);
   if (!energy) return energy;
   for (int round = 0; round < kRounds; ++round) {
     std::vector<models::Position> candidates = models;
     for (std::size_t m = 0; m < models.size(); ++m) {
-      std::vector<std::uint32_t> index;
-      for (std::size_t i = 0; i < owner.size(); ++i) {
-        if (owner[i] == m) index.push_back(static_cast<std::uint32_t>(i));
+      if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
+      index.clear();
+      for (std::size_t i = 0; i < distances.size(); ++i) {
+        if (distances[i] <= ground.tau[i]) index.push_back(static_cast<std::uint32_t>(i));
       }
-      weights(ground, index, least, weight);
+      weights(ground, index, distances, weight);
       if (!ground.space.refine(ground.points, {index, weight}, candidates[m])) candidates[m] = models[m];
     }
-    auto candidate_energy = nearest(ground, candidates, next, next_least);
+    auto candidate_energy = joint_energy(ground, candidates);
     if (!candidate_energy) return candidate_energy;
     if (!(*candidate_energy < *energy)) break;
     const bool worthwhile = *energy - *candidate_energy > kWorthwhile * *energy;
     models = std::move(candidates);
-    owner.swap(next);
-    least.swap(next_least);
     energy = candidate_energy;
     if (!worthwhile) break;
   }

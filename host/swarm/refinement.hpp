@@ -18,12 +18,12 @@ struct Ground {
   std::span<const float> tau;   ///< one a point [data unit]
 };
 
-/// Least squares on the points within tau that are not better explained already (distance below their cap), repeated while the
-/// truncated loss falls. `loss` is that of theta on entry and on return; it never rises.
+/// Least absolute deviations, by reweighting, on the points within tau that are not better explained already (distance below their cap),
+/// repeated while the truncated loss falls. `loss` is that of theta on entry and on return; it never rises.
 Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<const float> caps, models::Position& theta, double& loss);
 
 /// Energy of all models together: sum over points of min(tau_i, distance to the nearest model) [data unit].
-/// Alternates assignment and refitting while the energy falls; it never rises. Returns the energy.
+/// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models);
 
 }  // namespace swarmfit::swarm
