@@ -170,19 +170,10 @@ class Hyperplane : public ModelSpace {
   static bool moments(const WorkingPoints& points, const Weighted& support, Vector& mean, Eigen::Matrix<double, D, D>& scatter) {
     if (support.index.size() < static_cast<std::size_t>(D)) return false;
     double total = 0;
-    mean.setZero();
-    for (std::size_t k = 0; k < support.index.size(); ++k) {
-      total += support.weight[k];
-      mean += support.weight[k] * points.template point<D>(support.index[k]);
-    }
+    points.template accumulate<D>(support.index, support.weight, total, mean, scatter);
     if (!(total > 0)) return false;
     mean /= total;
-    scatter.setZero();
-    for (std::size_t k = 0; k < support.index.size(); ++k) {
-      const Vector x = points.template point<D>(support.index[k]) - mean;
-      scatter.noalias() += support.weight[k] * x * x.transpose();
-    }
-    scatter /= total;
+    scatter = scatter / total - mean * mean.transpose();
     return true;
   }
 

@@ -13,23 +13,12 @@ kernels::PointsView to_kernel(const PointsView& points) noexcept {
 }
 
 WorkingPoints::WorkingPoints(const PointsView& points) : view_(to_kernel(points)) {
-  const int dim = view_.dimension;
-  Eigen::Vector4d first = Eigen::Vector4d::Zero(), sum = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d square = Eigen::Matrix4d::Zero();
   finite_.assign(view_.count, 0);
-  for (std::size_t i = 0; i < view_.count; ++i) {
-    if (!view_.finite(i)) continue;
-    finite_[i] = 1;
-    Eigen::Vector4d x = Eigen::Vector4d::Zero();
-    for (int d = 0; d < dim; ++d) x[d] = view_.at(i, d);
-    // Sums are taken relative to the first finite point, so that coordinates of 5e6 m lose nothing.
-    if (finite_count_ == 0) first = x;
-    x -= first;
-    sum += x;
-    square.noalias() += x * x.transpose();
-    ++finite_count_;
+  if (view_.scalar == kernels::Scalar::float32) {
+    look_at<float>();
+  } else {
+    look_at<double>();
   }
-  if (finite_count_ > 0) describe(first, sum / static_cast<double>(finite_count_), square / static_cast<double>(finite_count_));
   if (finite_count_ == view_.count) {
     finite_.clear();
     return;
@@ -38,6 +27,38 @@ WorkingPoints::WorkingPoints(const PointsView& points) : view_(to_kernel(points)
   for (std::size_t i = 0; i < view_.count; ++i) {
     if (finite_[i]) index_.push_back(static_cast<std::uint32_t>(i));
   }
+}
+
+template <class T>
+void WorkingPoints::look_at() {
+  const auto dim = static_cast<std::size_t>(view_.dimension);
+  std::array<double, kMaxDimension> first{};
+  double sum[kMaxDimension] = {}, square[kMaxDimension][kMaxDimension] = {};
+  for (std::size_t i = 0; i < view_.count; ++i) {
+    T row[kMaxDimension] = {};
+    std::memcpy(row, static_cast<const char*>(view_.data) + i * view_.stride, sizeof(T) * dim);
+    T probe = 0;
+    for (std::size_t d = 0; d < dim; ++d) probe += row[d] * T{0};  // stays 0 unless a column is NaN or infinite
+    if (!(probe == 0)) continue;
+    finite_[i] = 1;
+    // Sums are taken relative to the first finite point, so that coordinates of 5e6 m lose nothing.
+    if (finite_count_++ == 0) std::copy(row, row + kMaxDimension, first.begin());
+    double x[kMaxDimension];
+    for (std::size_t d = 0; d < kMaxDimension; ++d) x[d] = static_cast<double>(row[d]) - first[d];
+    for (std::size_t d = 0; d < kMaxDimension; ++d) {
+      sum[d] += x[d];
+      for (std::size_t e = d; e < kMaxDimension; ++e) square[d][e] += x[d] * x[e];
+    }
+  }
+  if (finite_count_ == 0) return;
+  const auto n = static_cast<double>(finite_count_);
+  Eigen::Vector4d mean;
+  Eigen::Matrix4d second;
+  for (int d = 0; d < kMaxDimension; ++d) {
+    mean[d] = sum[d] / n;
+    for (int e = d; e < kMaxDimension; ++e) second(d, e) = second(e, d) = square[d][e] / n;
+  }
+  describe(Eigen::Vector4d(first.data()), mean, second);
 }
 
 void WorkingPoints::describe(const Eigen::Vector4d& origin, const Eigen::Vector4d& mean, const Eigen::Matrix4d& square) {

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -50,7 +52,43 @@ class WorkingPoints {
     return p;
   }
 
+  /// Weighted sums over points of the working frame: total weight, sum w x, sum w x x^T. One pass, in index order.
+  template <int D>
+  void accumulate(std::span<const std::uint32_t> index, std::span<const double> weight, double& total, Eigen::Matrix<double, D, 1>& sum,
+                  Eigen::Matrix<double, D, D>& square) const {
+    if (view_.scalar == kernels::Scalar::float32) {
+      accumulate_as<float, D>(index, weight, total, sum, square);
+    } else {
+      accumulate_as<double, D>(index, weight, total, sum, square);
+    }
+  }
+
  private:
+  template <class T, int D>
+  void accumulate_as(std::span<const std::uint32_t> index, std::span<const double> weight, double& total,
+                     Eigen::Matrix<double, D, 1>& sum, Eigen::Matrix<double, D, D>& square) const {
+    double w_all = 0, first[D] = {}, second[D][D] = {};
+    for (std::size_t k = 0; k < index.size(); ++k) {
+      T row[D];
+      std::memcpy(row, static_cast<const char*>(view_.data) + index[k] * view_.stride, sizeof row);
+      double x[D];
+      for (int d = 0; d < D; ++d) x[d] = static_cast<double>(row[d]) - frame_.centre[static_cast<std::size_t>(d)];
+      w_all += weight[k];
+      for (int d = 0; d < D; ++d) {
+        const double wx = weight[k] * x[d];
+        first[d] += wx;
+        for (int e = d; e < D; ++e) second[d][e] += wx * x[e];
+      }
+    }
+    total = w_all;
+    for (int d = 0; d < D; ++d) {
+      sum[d] = first[d] / frame_.scale;
+      for (int e = d; e < D; ++e) square(d, e) = square(e, d) = second[d][e] / (frame_.scale * frame_.scale);
+    }
+  }
+
+  template <class T>
+  void look_at();
   void describe(const Eigen::Vector4d& origin, const Eigen::Vector4d& mean, const Eigen::Matrix4d& square);
 
   kernels::PointsView view_;

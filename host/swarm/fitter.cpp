@@ -46,6 +46,27 @@ struct Fitter::State {
   FitOptions options;
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
+  std::unique_ptr<kernels::FitnessEvaluator> scout;  // made when a cloud is first large enough to need one
+
+  kernels::EvaluatorOptions wanted() const {
+    kernels::EvaluatorOptions w;
+    w.threads = options.threads;
+    w.pipeline_cache = options.pipeline_cache;
+    return w;
+  }
+
+  /// The scout for a cloud of that many finite points, of the same back end and device; null where the search is on all points.
+  Expected<kernels::FitnessEvaluator*> scout_for(std::size_t finite_points) {
+    const std::size_t part = swarm::resolve(options, finite_points, 1.0).search_points;
+    if (part == 0 || finite_points <= part) return nullptr;
+    if (!scout) {
+      const kernels::Identity& who = evaluator->identity();
+      auto made = kernels::make_evaluator(who.backend == "vulkan" ? who.device : who.backend, wanted());
+      if (!made) return tl::unexpected(swarm::to_error(made.error()));
+      scout = std::move(made->evaluator);
+    }
+    return scout.get();
+  }
 };
 
 Fitter::Fitter(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -55,13 +76,10 @@ Fitter& Fitter::operator=(Fitter&&) noexcept = default;
 
 Expected<Fitter> Fitter::create(const FitOptions& options) {
   if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
-  kernels::EvaluatorOptions wanted;
-  wanted.threads = options.threads;
-  wanted.pipeline_cache = options.pipeline_cache;
-  auto made = kernels::make_evaluator(options.backend, wanted);
-  if (!made) return tl::unexpected(swarm::to_error(made.error()));
   auto state = std::make_unique<State>();
   state->options = options;
+  auto made = kernels::make_evaluator(options.backend, state->wanted());
+  if (!made) return tl::unexpected(swarm::to_error(made.error()));
   state->evaluator = std::move(made->evaluator);
   state->reason = std::move(made->reason);
   return Fitter(std::move(state));
@@ -95,17 +113,20 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   }
   if (auto done = evaluator.set_points(models::to_kernel(points)); !done) return tl::unexpected(swarm::to_error(done.error()));
 
+  auto scout = state_->scout_for(working.finite_count());
+  if (!scout) return tl::unexpected(scout.error());
+
   FitResult result;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
   if (options.estimate_threshold || !given) {
-    auto estimated = swarm::estimate_threshold(evaluator, *space, working, options);
+    auto estimated = swarm::estimate_threshold(evaluator, *scout, *space, working, options);
     if (!estimated) return tl::unexpected(estimated.error());
     result.threshold = *estimated;
   } else {
     result.threshold = *given;
   }
   const swarm::Settings settings = swarm::resolve(options, working.finite_count(), result.threshold);
-  swarm::MultiModel search(evaluator, *space, working, settings, options.seed, limits);
+  swarm::MultiModel search(evaluator, *scout, *space, working, settings, options.seed, limits);
   if (auto done = search.run(on_model, warm_start, result); !done) return tl::unexpected(done.error());
   result.backend = backend();
   result.seed = options.seed;

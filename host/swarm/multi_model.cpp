@@ -12,18 +12,25 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
+constexpr int kRounds = 8;      // of refinement
+constexpr int kFullRounds = 2;  // of it on all points, after it was done on a part of them
+constexpr std::size_t kSampledFrom = 8192;  // points that minimal samples are drawn from: enough to tell surfaces apart
 
 }  // namespace
 
-MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points,
-                       const Settings& settings, std::uint64_t seed, Limits limits)
-    : evaluator_(evaluator), space_(space), points_(points), settings_(settings), random_(seed), limits_(std::move(limits)),
-      landscape_(evaluator, space, points.frame(), settings) {
+MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
+                       const models::WorkingPoints& points, const Settings& settings, std::uint64_t seed, Limits limits)
+    : evaluator_(evaluator), scout_(scout), space_(space), points_(points), settings_(settings), random_(seed), limits_(std::move(limits)),
+      landscape_(evaluator, space, points.frame(), settings),
+      searched_(scout != nullptr ? *scout : evaluator, space, points.frame(), settings),
+      subset_(points, random_, scout != nullptr ? settings.search_points : kSampledFrom) {
   tau_.assign(points.size(), static_cast<float>(settings.threshold));
   caps_.resize(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) caps_[i] = points.finite(i) ? tau_[i] : 0.0F;
   distances_.resize(points.size());
 }
+
+int MultiModel::rounds() const noexcept { return scout_ != nullptr ? kFullRounds : kRounds; }
 
 double MultiModel::elapsed_ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - limits_.start).count(); }
 
@@ -40,8 +47,31 @@ Expected<> MultiModel::distances(const models::Position& theta) {
   return {};
 }
 
+Expected<> MultiModel::set_caps(std::span<const float> caps) {
+  if (auto done = evaluator_.set_caps(caps); !done) return tl::unexpected(to_error(done.error()));
+  if (scout_ == nullptr) return {};
+  std::vector<float> part;
+  subset_.gather(caps, part);
+  if (auto done = scout_->set_caps(part); !done) return tl::unexpected(to_error(done.error()));
+  return {};
+}
+
+void MultiModel::count_effort(FitResult& result) const {
+  kernels::Effort effort = evaluator_.effort();
+  if (scout_ != nullptr) {
+    effort.evaluations += scout_->effort().evaluations;
+    effort.touched += scout_->effort().touched;
+  }
+  result.evaluations = static_cast<std::size_t>(effort.evaluations);
+  const double whole = static_cast<double>(effort.evaluations) * static_cast<double>(points_.finite_count());
+  result.points_touched = whole > 0 ? static_cast<double>(effort.touched) / whole : 1.0;
+}
+
 Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result) {
-  if (auto done = evaluator_.set_caps(caps_); !done) return tl::unexpected(to_error(done.error()));
+  if (scout_ != nullptr) {
+    if (auto done = scout_->set_points(subset_.view()); !done) return tl::unexpected(to_error(done.error()));
+  }
+  if (auto done = set_caps(caps_); !done) return done;
   std::vector<models::Position> seeds;
   for (const Model& model : warm_start) {
     models::Position theta = space_.from_data(model.parameters, points_.frame());
@@ -65,7 +95,7 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
       if (!*go_on) stop_reason_ = "stopped by the caller";
       continue;
     }
-    if (settings_.deflation == Deflation::parametric) landscape_.deflate_around(theta);
+    if (settings_.deflation == Deflation::parametric) searched_.deflate_around(theta);
     if (*outcome == Outcome::complete) {
       stop_reason_ = "complete: the list of global bests is stable";
     } else if (++unpaid >= settings_.patience) {
@@ -76,15 +106,26 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
   return finish(result);
 }
 
+double MultiModel::loss_of_nothing() const {
+  const std::span<const std::uint32_t> index = subset_.index();
+  const bool all = scout_ == nullptr;
+  if (settings_.deflation == Deflation::parametric) {
+    return settings_.threshold * static_cast<double>(all ? points_.finite_count() : index.size());
+  }
+  double sum = 0;
+  if (all) {
+    for (const float cap : caps_) sum += static_cast<double>(cap);
+  } else {
+    for (const std::uint32_t i : index) sum += static_cast<double>(caps_[i]);
+  }
+  return sum;
+}
+
 Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta,
                                                  double& loss) {
-  Sampler sampler(points_, space_, random_);
-  sampler.prefer_unexplained(caps_, 0.5, static_cast<float>(settings_.threshold));
-  double unexplained = 0;
-  for (const float cap : caps_) unexplained += static_cast<double>(cap);
-  scale_ = settings_.deflation == Deflation::parametric
-               ? settings_.threshold * static_cast<double>(points_.finite_count())
-               : unexplained;
+  Sampler sampler(points_, subset_.index(), space_, random_);
+  sampler.prefer_unexplained(caps_, static_cast<float>(settings_.threshold));
+  scale_ = loss_of_nothing();
   Swarm swarm(space_, settings_, random_);
   steps_ = 0;
   if (!swarm.start(sampler, round, seeds)) {
@@ -96,16 +137,24 @@ Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<
       stop_reason_ = *reason;
       return Outcome::interrupted;
     }
-    if (auto done = swarm.step(landscape_, sampler, scale_); !done) return tl::unexpected(done.error());
+    if (auto done = swarm.step(searched_, sampler, scale_); !done) return tl::unexpected(done.error());
   }
   steps_ = static_cast<std::size_t>(swarm.steps());
   theta = swarm.best();
+  if (settings_.refine && scout_ != nullptr) {
+    std::vector<float> tau, caps;
+    subset_.gather(tau_, tau);
+    subset_.gather(caps_, caps);
+    double part = swarm.best_fitness();
+    const Ground ground{*scout_, space_, points_, tau, subset_.index()};
+    if (auto done = refine_one(ground, searched_, caps, theta, part); !done) return tl::unexpected(done.error());
+  }
   auto exact = landscape_.loss(theta);
   if (!exact) return tl::unexpected(exact.error());
   loss = *exact;
   if (settings_.refine) {
-    const Ground ground{evaluator_, space_, points_, tau_};
-    if (auto done = refine_one(ground, landscape_, caps_, theta, loss); !done) return tl::unexpected(done.error());
+    const Ground ground{evaluator_, space_, points_, tau_, {}};
+    if (auto done = refine_one(ground, landscape_, caps_, theta, loss, rounds()); !done) return tl::unexpected(done.error());
   }
   if (auto done = distances(theta); !done) return tl::unexpected(done.error());
   if (pays(count_support(distances_, caps_, tau_), settings_, space_.minimal_sample())) return Outcome::found;
@@ -115,14 +164,15 @@ Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<
 }
 
 Expected<bool> MultiModel::accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result) {
-  const kernels::Effort effort = evaluator_.effort();
+  const std::size_t evaluations_before = result.evaluations;
+  count_effort(result);
   Model model;
   model.type = space_.type();
   model.parameters = space_.to_data(theta, points_.frame());
   model.cost = loss;
   model.iterations = steps_;
-  model.evaluations = static_cast<std::size_t>(effort.evaluations) - result.evaluations;
-  model.points_touched = effort.point_models > 0 ? static_cast<double>(effort.touched) / static_cast<double>(effort.point_models) : 1.0;
+  model.evaluations = result.evaluations - evaluations_before;
+  model.points_touched = result.points_touched;
   model.found_at_ms = elapsed_ms();
   double square = 0;
   for (std::size_t i = 0; i < distances_.size(); ++i) {
@@ -135,8 +185,7 @@ Expected<bool> MultiModel::accept(const models::Position& theta, double loss, co
   found_.push_back(theta);
   result.models.push_back(model);
   result.iterations += steps_;
-  result.evaluations = static_cast<std::size_t>(effort.evaluations);
-  if (settings_.deflation == Deflation::parametric) landscape_.deflate_around(theta);
+  if (settings_.deflation == Deflation::parametric) searched_.deflate_around(theta);
   if (auto done = deflate(distances_); !done) return tl::unexpected(done.error());
   return !on_model || on_model(result.models.back()) == Verdict::go_on;
 }
@@ -144,22 +193,19 @@ Expected<bool> MultiModel::accept(const models::Position& theta, double loss, co
 Expected<> MultiModel::deflate(std::span<const float> distances) {
   swarm::deflate(distances, tau_, tail_reach(distances, caps_, tau_), settings_.dead_zone_slope, caps_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
-  if (auto done = evaluator_.set_caps(caps_); !done) return tl::unexpected(to_error(done.error()));
-  return {};
+  return set_caps(caps_);
 }
 
 Expected<> MultiModel::finish(FitResult& result) {
   if (settings_.joint && !found_.empty() && !limits_.stop.stop_requested()) {
-    const Ground ground{evaluator_, space_, points_, tau_};
+    const Ground ground{evaluator_, space_, points_, tau_, {}};
     if (auto done = polish(ground); !done) return done;
-    if (auto energy = refine_jointly(ground, found_); !energy) return tl::unexpected(energy.error());
-    if (auto done = drop_unpaid(result); !done) return done;
+    if (auto energy = refine_jointly(ground, found_, rounds()); !energy) return tl::unexpected(energy.error());
+    if (auto done = drop_unpaid(ground, result); !done) return done;
     for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
   }
   if (auto done = label(result); !done) return done;
-  const kernels::Effort effort = evaluator_.effort();
-  result.evaluations = static_cast<std::size_t>(effort.evaluations);
-  result.points_touched = effort.point_models > 0 ? static_cast<double>(effort.touched) / static_cast<double>(effort.point_models) : 1.0;
+  count_effort(result);
   return describe(result);
 }
 
@@ -171,24 +217,20 @@ Expected<> MultiModel::polish(const Ground& ground) {
   for (models::Position& theta : found_) {
     auto loss = landscape_.loss(theta);
     if (!loss) return tl::unexpected(loss.error());
-    if (auto done = refine_one(ground, landscape_, full, theta, *loss); !done) return done;
+    if (auto done = refine_one(ground, landscape_, full, theta, *loss, rounds()); !done) return done;
   }
   return {};
 }
 
-Expected<> MultiModel::drop_unpaid(FitResult& result) {
+Expected<> MultiModel::drop_unpaid(const Ground& ground, FitResult& result) {
   while (found_.size() > 1) {
-    if (auto done = label(result); !done) return done;
-    std::vector<std::size_t> own(found_.size(), 0);
-    for (const std::uint16_t k : result.labels) {
-      if (k > 0) ++own[k - 1U];
-    }
-    const auto least = std::min_element(own.begin(), own.end());
+    auto unique = unique_support(ground, found_);
+    if (!unique) return tl::unexpected(unique.error());
+    const auto least = std::min_element(unique->begin(), unique->end());
     if (2 * *least >= settings_.min_inliers) return {};
-    found_.erase(found_.begin() + (least - own.begin()));
-    result.models.erase(result.models.begin() + (least - own.begin()));
-    const Ground ground{evaluator_, space_, points_, tau_};
-    if (auto energy = refine_jointly(ground, found_); !energy) return tl::unexpected(energy.error());
+    found_.erase(found_.begin() + (least - unique->begin()));
+    result.models.erase(result.models.begin() + (least - unique->begin()));
+    if (auto energy = refine_jointly(ground, found_, rounds()); !energy) return tl::unexpected(energy.error());
   }
   return {};
 }

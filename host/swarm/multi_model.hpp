@@ -13,6 +13,7 @@
 #include "host/swarm/random.hpp"
 #include "host/swarm/refinement.hpp"
 #include "host/swarm/settings.hpp"
+#include "host/swarm/subset.hpp"
 
 namespace swarmfit::swarm {
 
@@ -28,10 +29,12 @@ struct Limits {
 
 class MultiModel {
  public:
-  MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points,
-             const Settings& settings, std::uint64_t seed, Limits limits);
+  /// `evaluator` holds the points. `scout`, of the same kind, is given a part of them to search on where the settings say so and the cloud
+  /// is larger; nullptr searches on all points.
+  MultiModel(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
+             const models::WorkingPoints& points, const Settings& settings, std::uint64_t seed, Limits limits);
 
-  /// The evaluator holds the points already. Fills models, labels, stop_reason and the counts of the result.
+  /// Fills models, labels, stop_reason and the counts of the result.
   Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result);
 
  private:
@@ -42,20 +45,26 @@ class MultiModel {
   Expected<> deflate(std::span<const float> distances);
   Expected<> finish(FitResult& result);
   Expected<> polish(const Ground& ground);
-  Expected<> drop_unpaid(FitResult& result);
+  Expected<> drop_unpaid(const Ground& ground, FitResult& result);
   Expected<> label(FitResult& result);
   Expected<> describe(FitResult& result);
   std::optional<std::string> interrupted() const;
+  Expected<> set_caps(std::span<const float> caps);
+  void count_effort(FitResult& result) const;
   Expected<> distances(const models::Position& theta);
   double elapsed_ms() const;
+  int rounds() const noexcept;  ///< of refinement on all points
+  double loss_of_nothing() const;
 
   kernels::FitnessEvaluator& evaluator_;
+  kernels::FitnessEvaluator* scout_;            // null where the search is on all points
   const models::ModelSpace& space_;
   const models::WorkingPoints& points_;
   const Settings& settings_;
   Random random_;
   Limits limits_;
-  Landscape landscape_;
+  Landscape landscape_, searched_;              // of all points, and of those that are searched on
+  Subset subset_;                               // what samples are drawn from, and the scout's points
   std::vector<float> tau_, caps_, distances_;  // one a point; caps_ is what is left to explain, in both kinds of deflation
   std::vector<models::Position> found_;
   double scale_ = 0;                           // loss of a model that explains nothing

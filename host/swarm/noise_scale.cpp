@@ -42,7 +42,7 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
   return sigma;
 }
 
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
                                     const models::WorkingPoints& points, const FitOptions& options) {
   const double unit = points.frame().scale;
   double tau = kGenerous * unit;
@@ -50,7 +50,7 @@ Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const 
   for (int round = 0; round < kRounds; ++round) {
     Settings settings = resolve(options, points.finite_count(), tau);
     settings.joint = true;
-    MultiModel search(evaluator, space, points, settings, options.seed + static_cast<std::uint64_t>(round) + 1, Limits{});
+    MultiModel search(evaluator, scout, space, points, settings, options.seed + static_cast<std::uint64_t>(round) + 1, Limits{});
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
     // Median over the models' points: each model votes with what it holds.

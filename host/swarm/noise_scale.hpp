@@ -14,7 +14,7 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
 
 /// tau = 2.5 sigma, sigma the noise of the most prominent models: a swarm finds one under a generous threshold, the spread of its
 /// inliers gives the next threshold, until that stays. Fails with bad_input where the data show no scale.
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
                                     const models::WorkingPoints& points, const FitOptions& options);
 
 }  // namespace swarmfit::swarm

@@ -7,13 +7,12 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr int kRounds = 8;
 constexpr float kCorner = 0.1F;            // of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
 
 Expected<> measure(const Ground& ground, const models::Position& theta, std::vector<float>& distances) {
   const Eigen::VectorXd data = ground.space.to_data(theta, ground.points.frame());
-  distances.resize(ground.points.size());
+  distances.resize(ground.tau.size());
   const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
   if (auto done = ground.evaluator.distances(model, distances); !done) return tl::unexpected(to_error(done.error()));
   return {};
@@ -45,18 +44,21 @@ Expected<double> joint_energy(const Ground& ground, const std::vector<models::Po
 
 }  // namespace
 
-Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<const float> caps, models::Position& theta, double& loss) {
+Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<const float> caps, models::Position& theta, double& loss,
+                      int rounds) {
   std::vector<float> distances;
   std::vector<std::uint32_t> index;
   std::vector<double> weight;
-  for (int round = 0; round < kRounds; ++round) {
-    const models::Position& from = theta;
-    if (auto done = measure(ground, from, distances); !done) return done;
+  for (int round = 0; round < rounds; ++round) {
+    if (auto done = measure(ground, theta, distances); !done) return done;
     index.clear();
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (distances[i] <= ground.tau[i] && distances[i] <= caps[i]) index.push_back(static_cast<std::uint32_t>(i));
     }
     weights(ground, index, distances, weight);
+    if (!ground.index.empty()) {
+      for (std::uint32_t& i : index) i = ground.index[i];
+    }
     models::Position candidate = theta;
     if (!ground.space.refine(ground.points, {index, weight}, candidate)) return {};
     auto cost = landscape.loss(candidate);
@@ -70,13 +72,13 @@ Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<cons
   return {};
 }
 
-Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models) {
+Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models, int rounds) {
   std::vector<float> distances;
   std::vector<std::uint32_t> index;
   std::vector<double> weight;
   auto energy = joint_energy(ground, models);
   if (!energy) return energy;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     std::vector<models::Position> candidates = models;
     for (std::size_t m = 0; m < models.size(); ++m) {
       if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
@@ -96,6 +98,23 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Positi
     if (!worthwhile) break;
   }
   return energy;
+}
+
+Expected<std::vector<std::size_t>> unique_support(const Ground& ground, const std::vector<models::Position>& models) {
+  constexpr std::uint16_t kSeveral = 65535;
+  std::vector<std::uint16_t> owner(ground.tau.size(), 0);
+  std::vector<float> distances;
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (distances[i] <= ground.tau[i]) owner[i] = owner[i] == 0 ? static_cast<std::uint16_t>(m + 1) : kSeveral;
+    }
+  }
+  std::vector<std::size_t> unique(models.size(), 0);
+  for (const std::uint16_t m : owner) {
+    if (m != 0 && m != kSeveral) ++unique[m - 1U];
+  }
+  return unique;
 }
 
 }  // namespace swarmfit::swarm

@@ -66,6 +66,7 @@ Settings preset(Preset preset) {
   s.topology = Topology::ring;
   s.local_share = 0.5;
   s.still = 1e-3;
+  s.search_points = 8192;
   return s;
 }
 

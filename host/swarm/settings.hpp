@@ -26,6 +26,7 @@ struct Settings {
   double local_share = 0;            ///< of the minimal samples that take nearby points, in [0, 1]
   double renewal_share = 0;          ///< of the particles that start anew from a sample at each step, in [0, 1]
   double still = 0;                  ///< a global best that gains less than this share of the saving has not moved
+  std::size_t search_points = 0;     ///< a larger cloud is searched on this many of its points; 0: on all
   Deflation deflation = Deflation::residual;
   double lambda = 10;                ///< Eq. (5)
   double dead_zone_slope = 2;        ///< kappa of design 2.1: how fast caps rise beyond the dead zone
