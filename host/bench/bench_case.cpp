@@ -13,6 +13,7 @@
 #include "host/swarm/random.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/settings.hpp"
+#include "host/swarm/subset.hpp"
 #include "host/swarm/swarm.hpp"
 #include "kernels/evaluators.hpp"
 
@@ -21,6 +22,7 @@ namespace {
 
 constexpr int kSteps = 10;
 constexpr double kSyntheticSpread = 0.003;
+constexpr std::size_t kSampledFrom = 8192;
 constexpr double kThreshold = 0.01;  // of a plane by default, and three times the spread above
 
 /// Passes everything on and keeps a copy of each swarm it is asked about.
@@ -58,7 +60,8 @@ Expected<> fly(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& s
   swarm::Settings settings = swarm::resolve(options, working.finite_count(), kThreshold);
   settings.particles = static_cast<int>(particles);
   const swarm::Random random(seed);
-  const swarm::Sampler sampler(working, space, random);
+  const swarm::Subset subset(working, random, kSampledFrom);
+  const swarm::Sampler sampler(working, subset.index(), space, random);
   swarm::Landscape landscape(evaluator, space, working.frame(), settings);
   swarm::Swarm swarm(space, settings, random);
   if (!swarm.start(sampler, 0, {})) return fail(Error::Kind::bad_input, "the points determine no model: all samples are degenerate");
