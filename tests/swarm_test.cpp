@@ -1,0 +1,262 @@
+// The parts of the swarm, each against what its equation says, and whole swarms on a landscape that is known.
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "host/swarm/deflation.hpp"
+#include "host/swarm/noise_scale.hpp"
+#include "host/swarm/payment.hpp"
+#include "host/swarm/sampler.hpp"
+#include "host/swarm/subset.hpp"
+#include "host/swarm/swarm.hpp"
+
+namespace swarmfit::swarm {
+namespace {
+
+TEST(Constriction, IsThatOfEquation1) {
+  EXPECT_NEAR(constriction(2.1, 2.0), 0.7298, 5e-5);
+  EXPECT_EQ(constriction(2.0, 2.0), 1.0);  // below c > 4 there is nothing to constrict
+}
+
+TEST(Roulette, SharesAreByImprovementOverTheWorst) {
+  const double fitness[] = {10, 7, 9};  // improvements 0, 3, 1
+  int drawn[3] = {};
+  for (int k = 0; k < 4000; ++k) ++drawn[roulette(fitness, k / 4000.0)];
+  EXPECT_EQ(drawn[0], 0);
+  EXPECT_EQ(drawn[1], 3000);
+  EXPECT_EQ(drawn[2], 1000);
+}
+
+TEST(Roulette, TakesTheNewestWhereAllAreEqual) {
+  const double fitness[] = {5, 5, 5};
+  EXPECT_EQ(roulette(fitness, 0.1), 2U);
+}
+
+TEST(Random, DependsOnThePlaceAndNotOnTheOrder) {
+  const Random a(7), b(7), other(8);
+  const auto late = a.words(Draw::move, 1, 2, 3);
+  (void)b.words(Draw::sample, 9, 9, 9);
+  EXPECT_EQ(late, b.words(Draw::move, 1, 2, 3));
+  EXPECT_NE(late, other.words(Draw::move, 1, 2, 3));
+  EXPECT_NE(late, a.words(Draw::sample, 1, 2, 3));
+}
+
+/// A cloud near the plane z = 0.
+std::vector<double> slab(std::size_t n, double thickness) {
+  std::vector<double> rows;
+  const Random random(3);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const auto w = random.words(Draw::subset, 5, 0, i);
+    rows.insert(rows.end(), {Random::unit(w[0]) - 0.5, Random::unit(w[1]) - 0.5, thickness * (Random::unit(w[2]) - 0.5)});
+  }
+  return rows;
+}
+
+models::Position plane(double x, double y, double z, double offset) {
+  models::Position p(4);
+  p << Eigen::Vector3d(x, y, z).normalized(), offset;
+  return p;
+}
+
+TEST(PlaneSpace, OppositeNormalsAreOnePlane) {
+  const auto space = models::make_space(ModelType::plane, {});
+  EXPECT_NEAR(space->distance(plane(0, 0, 1, 0.3), plane(0, 0, -1, -0.3)), 0, 1e-12);
+}
+
+TEST(PlaneSpace, DifferenceThenMoveArrives) {
+  const auto space = models::make_space(ModelType::plane, {});
+  const models::Position from = plane(0.2, -0.4, 1, 0.1), to = plane(-1, -0.3, -0.5, -0.7);
+  models::Position at = from;
+  Eigen::VectorXd velocity(4);
+  space->difference(from, to, velocity);
+  EXPECT_NEAR(velocity.head<3>().dot(from.head<3>()), 0, 1e-12) << "a velocity lies in the tangent plane";
+  space->move(at, velocity);
+  EXPECT_NEAR(space->distance(at, to), 0, 1e-9);
+  EXPECT_NEAR(at.head<3>().norm(), 1, 1e-12);
+  EXPECT_NEAR(velocity.head<3>().dot(at.head<3>()), 0, 1e-9) << "and is carried along";
+}
+
+TEST(PlaneSpace, PriorPullsBackToItsCone) {
+  const double alpha = 0.2;
+  const auto space = models::make_space(ModelType::plane, DirectionPrior{Eigen::Vector3d(0, 0, 2), alpha});
+  models::Position tilted = plane(1, 0, 1, 0.25);
+  ASSERT_TRUE(space->admit(tilted));
+  EXPECT_NEAR(std::acos(std::abs(tilted[2])), alpha, 1e-9);
+  models::Position flipped = plane(0.05, 0, -1, 0.25);
+  ASSERT_TRUE(space->admit(flipped));
+  EXPECT_GT(flipped[2], 0);
+  EXPECT_NEAR(flipped[3], -0.25, 1e-12);
+}
+
+TEST(PlaneSpace, DegenerateSamplesAreRefused) {
+  const std::vector<double> rows{0, 0, 0, 1, 1, 1, 2, 2, 2, 0, 1, 0};
+  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
+  const auto space = models::make_space(ModelType::plane, {});
+  models::Position theta;
+  const std::uint32_t line[] = {0, 1, 2}, same[] = {0, 0, 1}, good[] = {0, 1, 3};
+  EXPECT_FALSE(space->from_sample(points, line, theta));
+  EXPECT_FALSE(space->from_sample(points, same, theta));
+  EXPECT_TRUE(space->from_sample(points, good, theta));
+}
+
+TEST(WorkingPoints, RankTellsPointLineAndPlane) {
+  const auto rank = [](std::vector<float> rows) { return models::WorkingPoints(PointsView(std::span<const float>(rows), 3)).rank(); };
+  EXPECT_EQ(rank({1, 2, 3, 1, 2, 3, 1, 2, 3}), 0);
+  EXPECT_EQ(rank({0, 0, 0, 1.1F, 2.2F, 3.3F, 0.7F, 1.4F, 2.1F, 5.5F, 11, 16.5F}), 1);
+  EXPECT_EQ(rank({0, 0, 0, 1, 0, 0, 0, 1, 0, 3, 4, 0}), 2);
+  EXPECT_EQ(rank({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}), 3);
+}
+
+TEST(WorkingPoints, CountsOnlyFinitePoints) {
+  const float nan = std::nanf("");
+  const std::vector<float> rows{0, 0, 0, nan, 0, 0, 1, 0, 0, 0, INFINITY, 0, 0, 1, 0};
+  const models::WorkingPoints points(PointsView(std::span<const float>(rows), 3));
+  EXPECT_EQ(points.finite_count(), 3U);
+  EXPECT_EQ(points.finite_index(1), 2U);
+  EXPECT_FALSE(points.finite(3));
+}
+
+/// Fitness is the squared distance of the normal and the offset from a hidden plane: one optimum, known.
+class Bowl final : public kernels::FitnessEvaluator {
+ public:
+  explicit Bowl(models::Position hidden) : hidden_(std::move(hidden)), space_(models::make_space(ModelType::plane, {})) {}
+  const kernels::Identity& identity() const noexcept override { return identity_; }
+  kernels::Support supports(const kernels::Workload&) const override { return {}; }
+  kernels::Result<> set_points(const kernels::PointsView&) override { return {}; }
+  kernels::Result<> set_caps(std::span<const float>) override { return {}; }
+  kernels::Result<> evaluate(const kernels::SwarmView& swarm, kernels::Loss, std::span<const float>, std::span<float> costs) override {
+    for (std::size_t j = 0; j < swarm.count; ++j) {
+      const models::Position theta = Eigen::Map<const Eigen::VectorXd>(swarm.parameters.data() + 4 * j, 4);
+      costs[j] = static_cast<float>(std::pow(space_->distance(theta, hidden_), 2));
+    }
+    return {};
+  }
+  kernels::Result<> distances(const kernels::ModelView&, std::span<float>) override { return {}; }
+  kernels::Result<> assign(std::span<const kernels::ModelView>, std::span<const float>, std::span<std::uint16_t>) override { return {}; }
+  kernels::Effort effort() const noexcept override { return {}; }
+
+ private:
+  kernels::Identity identity_{"bowl", "a known landscape"};
+  models::Position hidden_;
+  std::unique_ptr<models::ModelSpace> space_;
+};
+
+class KnownLandscape : public testing::TestWithParam<Topology> {};
+
+TEST_P(KnownLandscape, SwarmConvergesOnTheOptimum) {
+  const std::vector<double> rows = slab(200, 1.0);
+  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
+  const auto space = models::make_space(ModelType::plane, {});
+  // The bowl is asked in the data's frame.
+  const models::Position hidden = plane(0.3, -0.2, 0.9, 0.05);
+  Bowl bowl(hidden);
+  Settings settings;
+  settings.topology = GetParam();
+  settings.iterations = 400;
+  const Random random(11);
+  const Subset subset(points, random, 1000);
+  const Sampler sampler(points, subset.index(), *space, random);
+  Landscape landscape(bowl, *space, points.frame(), settings);
+  Swarm swarm(*space, settings, random);
+  ASSERT_TRUE(swarm.start(sampler, 0, {}));
+  double last = INFINITY;
+  while (!swarm.converged() && swarm.steps() < settings.iterations) {
+    ASSERT_TRUE(swarm.step(landscape, sampler, 1.0));
+    EXPECT_LE(swarm.best_fitness(), last) << "the global best never worsens";
+    EXPECT_LE(swarm.global_bests().size(), static_cast<std::size_t>(settings.roulette_length));
+    last = swarm.best_fitness();
+  }
+  const models::Position found = space->to_data(swarm.best(), points.frame());
+  EXPECT_LT(space->distance(found, hidden), 0.01);
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, KnownLandscape, testing::Values(Topology::roulette, Topology::ring));
+
+TEST(Landscape, Equation5LessensTheFitnessAroundAnOptimum) {
+  const models::Position hidden = plane(0, 0, 1, 0);
+  const auto space = models::make_space(ModelType::plane, {});
+  Bowl bowl(hidden);
+  Settings settings;
+  settings.deflation = Deflation::parametric;
+  settings.lambda = 4;
+  const models::Frame frame;
+  Landscape landscape(bowl, *space, frame, settings);
+  const models::Position near = plane(0.1, 0, 1, 0), optimum = plane(0.3, 0, 1, 0.2);
+  const std::vector<models::Position> at{near};
+  const std::vector<double> bests{INFINITY};
+  std::vector<double> plain(1), deflated(1);
+  ASSERT_TRUE(landscape.fitness(at, bests, plain));
+  landscape.deflate_around(optimum);
+  ASSERT_TRUE(landscape.fitness(at, bests, deflated));
+  const double d = space->distance(near, optimum);
+  EXPECT_NEAR(deflated[0] / plain[0], 4 * std::exp(-4 * d) + 1, 1e-9);
+}
+
+TEST(Deflation, TakesAllWithinReachAndNothingWellBeyond) {
+  const std::vector<float> tau(5, 0.1F), distances{0.0F, 0.09F, 0.12F, 0.5F, std::nanf("")};
+  std::vector<float> caps{0.1F, 0.1F, 0.1F, 0.05F, 0.0F};
+  deflate(distances, tau, 1, 2.0, caps);
+  EXPECT_FLOAT_EQ(caps[0], 0.0F);
+  EXPECT_FLOAT_EQ(caps[1], 0.0F);
+  EXPECT_NEAR(caps[2], 0.04F, 1e-6F);
+  EXPECT_FLOAT_EQ(caps[3], 0.05F) << "a cap never rises";
+  EXPECT_FLOAT_EQ(caps[4], 0.0F);
+}
+
+TEST(Deflation, ReachFollowsATailAndStopsAtAnEvenBackground) {
+  const auto reach = [](double sigma, std::size_t background) {
+    std::vector<float> distances;
+    for (int k = 0; k < 5000; ++k) {  // quantiles of |N(0, sigma)|, by bisection of erf
+      double low = 0, high = 8;
+      for (int b = 0; b < 40; ++b) (std::erf((low + high) / 2 / std::numbers::sqrt2) < (k + 0.5) / 5000 ? low : high) = (low + high) / 2;
+      distances.push_back(static_cast<float>(sigma * low));
+    }
+    for (std::size_t k = 0; k < background; ++k) distances.push_back(static_cast<float>(10.0 * static_cast<double>(k) / static_cast<double>(background)));
+    const std::vector<float> ones(distances.size(), 1.0F);
+    return tail_reach(distances, ones, ones);
+  };
+  EXPECT_EQ(reach(0.4, 0), 1);
+  EXPECT_EQ(reach(0.4, 20000), 1) << "an even background is no tail";
+  EXPECT_GE(reach(1.5, 0), 3);
+}
+
+TEST(Payment, AModelOfTheBackgroundsDensityDoesNotPay) {
+  Settings settings;
+  settings.min_inliers = 10;
+  EXPECT_FALSE(pays({50, 100, 1000}, settings, 2)) << "as dense as what surrounds it";
+  EXPECT_TRUE(pays({150, 100, 1000}, settings, 2));
+  EXPECT_FALSE(pays({9, 0, 1000}, settings, 2)) << "fewer than min_inliers";
+  EXPECT_LT(log_false_alarms({150, 100, 1000}, 2), log_false_alarms({120, 100, 1000}, 2));
+}
+
+TEST(NoiseScale, GaussianPartAmongUniformBackground) {
+  const Random random(5);
+  std::vector<float> distances;
+  for (std::uint32_t i = 0; i < 4000; ++i) {
+    const auto w = random.words(Draw::subset, 1, 1, i);
+    const double radius = std::sqrt(-2 * std::log(1 - Random::unit(w[0])));
+    distances.push_back(static_cast<float>(std::abs(0.02 * radius * std::cos(6.283185307179586 * Random::unit(w[1])))));
+    if (i % 2 == 0) distances.push_back(static_cast<float>(0.3 * Random::unit(w[2])));
+  }
+  EXPECT_NEAR(gaussian_part(distances, 0.1, 0.3), 0.02, 0.001);
+  EXPECT_EQ(gaussian_part({}, 0.1, 0.3), 0);
+}
+
+TEST(Subset, CoversEvenlyAndKeepsNeighboursTogether) {
+  const std::vector<double> rows = slab(5000, 0.01);
+  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
+  const Random random(1);
+  const Subset part(points, random, 500), whole(points, random, 10000);
+  EXPECT_EQ(part.index().size(), 500U);
+  EXPECT_EQ(whole.index().size(), 5000U);
+  double along = 0, across = 0;
+  for (std::size_t k = 1; k < part.index().size(); ++k) {
+    along += (points.point<3>(part.index()[k]) - points.point<3>(part.index()[k - 1])).norm();
+    across += (points.point<3>(part.index()[k]) - points.point<3>(part.index()[(k + 250) % 500])).norm();
+  }
+  EXPECT_LT(along, 0.3 * across);
+}
+
+}  // namespace
+}  // namespace swarmfit::swarm
