@@ -1,0 +1,117 @@
+// Refinement never worsens what it refines.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "host/swarm/random.hpp"
+#include "host/swarm/refinement.hpp"
+#include "kernels/evaluators.hpp"
+
+namespace swarmfit::swarm {
+namespace {
+
+/// Two crossing lines with noise, and outliers, in the unit square.
+std::vector<double> crossing_lines() {
+  const Random random(17);
+  std::vector<double> rows;
+  for (std::uint32_t i = 0; i < 600; ++i) {
+    const auto w = random.words(Draw::subset, 2, 0, i);
+    const double u = Random::unit(w[0]), v = Random::unit(w[1]);
+    const double noise = 0.01 * (Random::unit(w[2]) + Random::unit(w[3]) - 1);
+    if (i % 3 == 0) rows.insert(rows.end(), {u, 0.4 + 0.2 * u + noise});
+    if (i % 3 == 1) rows.insert(rows.end(), {u, 0.6 - 0.3 * u + noise});
+    if (i % 3 == 2) rows.insert(rows.end(), {u, v});
+  }
+  return rows;
+}
+
+class Refinement : public testing::Test {
+ protected:
+  void SetUp() override {
+    evaluator_ = std::move(*kernels::make_reference_evaluator());
+    ASSERT_TRUE(evaluator_->set_points(points_.view()));
+    tau_.assign(points_.size(), 0.03F);
+    ASSERT_TRUE(evaluator_->set_caps(tau_));
+  }
+  /// A line a little off y = a + b x.
+  models::Position off(double a, double b, double turn, double shift) const {
+    Eigen::VectorXd data(3);
+    const double angle = std::atan(b) + turn;
+    data << -std::sin(angle), std::cos(angle), 0;
+    data[2] = -(data[0] * 0.5 + data[1] * (a + b * 0.5)) + shift;
+    return space_->from_data(data, points_.frame());
+  }
+  /// Sum of min(tau, distance to the nearest), straight from the reference.
+  double energy(const std::vector<models::Position>& lines) {
+    std::vector<float> least = tau_, distances(points_.size());
+    for (const models::Position& line : lines) {
+      const Eigen::VectorXd data = space_->to_data(line, points_.frame());
+      EXPECT_TRUE(evaluator_->distances({space_->kind(), std::span<const double>(data.data(), 3)}, distances));
+      for (std::size_t i = 0; i < least.size(); ++i) least[i] = std::min(least[i], distances[i]);
+    }
+    double sum = 0;
+    for (const float v : least) sum += static_cast<double>(v);
+    return sum;
+  }
+
+  const std::vector<double> rows_ = crossing_lines();
+  const models::WorkingPoints points_{PointsView(std::span<const double>(rows_), 2)};
+  const std::unique_ptr<models::ModelSpace> space_ = models::make_space(ModelType::line2d, {});
+  std::unique_ptr<kernels::FitnessEvaluator> evaluator_;
+  std::vector<float> tau_;
+  const Settings settings_;
+};
+
+TEST_F(Refinement, OneModelComesCloserAndItsLossNeverRises) {
+  Landscape landscape(*evaluator_, *space_, points_.frame(), settings_);
+  const Ground ground{*evaluator_, *space_, points_, tau_, {}};
+  const models::Position truth = off(0.4, 0.2, 0, 0);
+  for (const double turn : {-0.03, -0.01, 0.02, 0.3}) {
+    models::Position line = off(0.4, 0.2, turn, 0.008);
+    const double before = *landscape.loss(line), away = space_->distance(line, truth);
+    double loss = before;
+    ASSERT_TRUE(refine_one(ground, landscape, tau_, line, loss));
+    EXPECT_LE(loss, before);
+    EXPECT_NEAR(loss, *landscape.loss(line), 1e-5) << "the loss told is that of the line returned";
+    if (std::abs(turn) < 0.1) {
+      EXPECT_LT(space_->distance(line, truth), 0.5 * away);
+    }
+  }
+}
+
+TEST_F(Refinement, PointsAlreadyExplainedAreLeftOut) {
+  Landscape landscape(*evaluator_, *space_, points_.frame(), settings_);
+  const Ground ground{*evaluator_, *space_, points_, tau_, {}};
+  const std::vector<float> nothing_left(tau_.size(), 0.0F);
+  ASSERT_TRUE(evaluator_->set_caps(nothing_left));
+  models::Position line = off(0.4, 0.2, 0.02, 0.008);
+  const models::Position before = line;
+  double loss = *landscape.loss(line);
+  ASSERT_TRUE(refine_one(ground, landscape, nothing_left, line, loss));
+  EXPECT_EQ(line, before);
+}
+
+TEST_F(Refinement, JointEnergyNeverRises) {
+  const Ground ground{*evaluator_, *space_, points_, tau_, {}};
+  for (const double turn : {-0.03, 0.0, 0.02, 0.2}) {
+    std::vector<models::Position> lines{off(0.4, 0.2, turn, 0.01), off(0.6, -0.3, -turn, -0.005)};
+    const double before = energy(lines);
+    const auto told = refine_jointly(ground, lines);
+    ASSERT_TRUE(told);
+    EXPECT_LE(*told, before + 1e-6);
+    EXPECT_NEAR(*told, energy(lines), 1e-6);
+  }
+}
+
+TEST_F(Refinement, UniqueSupportOfTwinsIsNothing) {
+  const Ground ground{*evaluator_, *space_, points_, tau_, {}};
+  const models::Position line = off(0.4, 0.2, 0, 0), twin = off(0.4, 0.2, 1e-5, 0), other = off(0.6, -0.3, 0, 0);
+  const auto unique = unique_support(ground, {line, twin, other});
+  ASSERT_TRUE(unique);
+  EXPECT_LT((*unique)[0], 3U);
+  EXPECT_LT((*unique)[1], 3U);
+  EXPECT_GT((*unique)[2], 100U);
+}
+
+}  // namespace
+}  // namespace swarmfit::swarm
