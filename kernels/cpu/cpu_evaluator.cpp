@@ -1,5 +1,5 @@
-// The CPU back end: fixed tiles of points under TBB, Highway vectors inside (cpu_kernels.hpp). Every sum is taken in an order that
-// neither the number of threads nor the other models of a swarm have a part in.
+// The CPU back end: fixed tiles of points under TBB, Highway vectors inside (cpu_kernels.hpp). No sum depends on the number of threads
+// or on the other models of a swarm.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,6 +17,7 @@
 #include "kernels/checks.hpp"
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/cpu/point_store.hpp"
+#include "kernels/cpu/swarm_costs.hpp"
 #include "kernels/evaluators.hpp"
 
 namespace swarmfit::kernels {
@@ -25,8 +26,6 @@ namespace {
 using namespace cpu;
 
 constexpr int kMaxThreads = 4096;
-/// Runs of tiles whose costs are summed first; few, so that partial sums stay small whatever the size of the cloud.
-constexpr std::size_t kMaxRuns = 128;
 
 std::vector<std::string> kernel_names() {
   std::vector<std::string> names;
@@ -57,8 +56,8 @@ Result<> guarded(std::size_t points, Work&& work) {
 
 class CpuEvaluator final : public FitnessEvaluator {
  public:
-  CpuEvaluator(const CpuKernels& kernels, int threads)
-      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels, threads)} {}
+  CpuEvaluator(const CpuKernels& kernels, int threads, bool pruning)
+      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels, threads)}, costs_(kernels, pruning) {}
 
   const Identity& identity() const noexcept override { return identity_; }
   Support supports(const Workload& workload) const override {
@@ -69,6 +68,7 @@ class CpuEvaluator final : public FitnessEvaluator {
 
   Result<> set_points(const PointsView& points) override {
     effort_ = {};
+    costs_.forget();
     if (auto ok = check_points(points); !ok) return ok;
     return guarded(points.count, [&] { arena_.execute([&] { store_.assign(points); }); });
   }
@@ -81,6 +81,7 @@ class CpuEvaluator final : public FitnessEvaluator {
         return fail(Failure::Kind::invalid, fmt::format("caps[{}] is {}, must be finite and >= 0", row, caps[row]));
       }
     }
+    costs_.forget();
     arena_.execute([&] { store_.set_caps(caps); });
     return {};
   }
@@ -89,11 +90,10 @@ class CpuEvaluator final : public FitnessEvaluator {
     if (auto ok = check_swarm(swarm, store_.dimension(), cutoffs, costs); !ok) return ok;
     return guarded(store_.count(), [&] {
       centre(swarm);
-      arena_.execute([&] { sum_costs(swarm, loss); });
-      gather(swarm.count, costs);
+      const CentredSwarm centred{swarm.kind, swarm.count, coefficients_, finite_, cutoffs};
+      arena_.execute([&] { effort_.touched += costs_.evaluate(store_, centred, loss, costs); });
       effort_.evaluations += swarm.count;
       effort_.point_models += swarm.count * store_.finite();
-      effort_.touched += swarm.count * store_.finite();
     });
   }
 
@@ -159,33 +159,6 @@ class CpuEvaluator final : public FitnessEvaluator {
     }
   }
 
-  /// Tiles in runs, models in groups: each pair is a task, and writes its own partial sums.
-  void sum_costs(const SwarmView& swarm, Loss loss) {
-    const auto width = static_cast<std::size_t>(traits(swarm.kind).coefficient_count);
-    const std::size_t tiles_a_run = (store_.tiles() + kMaxRuns - 1) / kMaxRuns;
-    runs_ = tiles_a_run == 0 ? 0 : (store_.tiles() + tiles_a_run - 1) / tiles_a_run;
-    const std::size_t groups = (swarm.count + kGroupModels - 1) / kGroupModels;
-    partial_.assign(runs_ * swarm.count, 0.0);
-    tbb::parallel_for(std::size_t{0}, runs_ * groups, [&](std::size_t task) {
-      const std::size_t run = task / groups;
-      const std::size_t first_model = task % groups * kGroupModels;
-      const std::size_t models = std::min(kGroupModels, swarm.count - first_model);
-      const std::size_t last_tile = std::min(store_.tiles(), (run + 1) * tiles_a_run);
-      for (std::size_t tile = run * tiles_a_run; tile < last_tile; ++tile) {
-        kernels_.add_costs(swarm.kind, loss, store_.tile(tile), coefficients_.data() + first_model * width, models,
-                           partial_.data() + run * swarm.count + first_model);
-      }
-    });
-  }
-
-  void gather(std::size_t models, std::span<float> costs) const {
-    for (std::size_t j = 0; j < models; ++j) {
-      double total = 0;
-      for (std::size_t run = 0; run < runs_; ++run) total += partial_[run * models + j];
-      costs[j] = finite_[j] ? static_cast<float>(total) : std::numeric_limits<float>::infinity();
-    }
-  }
-
   void assign_tile(std::size_t tile, std::span<const ModelView> models, const std::vector<std::array<float, kMaxParameters>>& coefficients,
                    const std::vector<char>& usable, std::span<const float> tolerance, std::span<std::uint16_t> labels) const {
     alignas(64) std::array<float, kTilePoints> near, nearest, allowed;
@@ -209,8 +182,7 @@ class CpuEvaluator final : public FitnessEvaluator {
   PointStore store_;
   std::vector<float> coefficients_;
   std::vector<char> finite_;      ///< a model: whether its coefficients are finite
-  std::vector<double> partial_;   ///< a run of tiles and a model: the cost
-  std::size_t runs_ = 0;
+  SwarmCosts costs_;
   Effort effort_;
 };
 
@@ -220,9 +192,11 @@ Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOpti
   if (options.threads < 0 || options.threads > kMaxThreads) {
     return fail(Failure::Kind::invalid, fmt::format("threads is {}, must be in [0, {}]", options.threads, kMaxThreads));
   }
-  const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  // More threads than processors would only be refused, aloud, by TBB.
+  const int most = tbb::info::default_concurrency();
+  const int threads = options.threads > 0 ? std::min(options.threads, most) : most;
   for (const CpuKernels* kernels : available_kernels()) {
-    if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name)) return std::make_unique<CpuEvaluator>(*kernels, threads);
+    if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name)) return std::make_unique<CpuEvaluator>(*kernels, threads, options.pruning);
   }
   return fail(Failure::Kind::unavailable,
               fmt::format("simd is '{}', must be one of what this processor has: {}", options.simd, fmt::join(kernel_names(), ", ")));

@@ -51,7 +51,7 @@ HWY_INLINE Vector loss_of(Vector distance, Vector limit) {
 /// Lane sums of one block for `P` models held in registers. Two accumulators a model hide the addition's latency; their order is part
 /// of the answer and the same for every P.
 template <class Model, Loss loss, int P>
-HWY_INLINE void block_costs(const TileView& tile, std::size_t first, const float* HWY_RESTRICT coefficients, float* HWY_RESTRICT sums) {
+HWY_INLINE void block_sums(const TileView& tile, std::size_t first, const float* const* coefficients, Vector* total) {
   constexpr int D = Model::traits.dimension;
   constexpr int C = Model::traits.coefficient_count;
   constexpr std::size_t L = lanes();
@@ -60,7 +60,7 @@ HWY_INLINE void block_costs(const TileView& tile, std::size_t first, const float
   Vector k[P][C];
   Vector sum[P][2];
   for (int p = 0; p < P; ++p) {
-    for (int c = 0; c < C; ++c) k[p][c] = hn::Set(d, coefficients[p * C + c]);
+    for (int c = 0; c < C; ++c) k[p][c] = hn::Set(d, coefficients[p][c]);
     sum[p][0] = sum[p][1] = hn::Zero(d);
   }
   for (std::size_t i = first; i < first + kBlockPoints; i += 2 * L) {
@@ -71,39 +71,127 @@ HWY_INLINE void block_costs(const TileView& tile, std::size_t first, const float
       for (int p = 0; p < P; ++p) sum[p][half] = hn::Add(sum[p][half], loss_of<loss>(Model::residual(math, x, k[p]), limit));
     }
   }
-  for (int p = 0; p < P; ++p) {
-    float* HWY_RESTRICT lane_sums = sums + static_cast<std::size_t>(p) * L;
-    hn::Store(hn::Add(hn::Load(d, lane_sums), hn::Add(sum[p][0], sum[p][1])), d, lane_sums);
-  }
+  for (int p = 0; p < P; ++p) total[p] = hn::Add(sum[p][0], sum[p][1]);
 }
+
+/// Whole quanta: exact however they are added up.
+struct QuantumSums {
+  using Lane = std::int32_t;
+  static HWY_INLINE void add(Vector lane_sums, Vector scale, Lane* HWY_RESTRICT to) {
+    const BitsTag d;
+    hn::Store(hn::Add(hn::Load(d, to), hn::NearestInt(hn::Mul(lane_sums, scale))), d, to);
+  }
+  static void finish(const Lane* from, PartialCost& cost) {
+    for (std::size_t lane = 0; lane < lanes(); ++lane) cost.units += from[lane];
+  }
+};
+
+/// Floating point, block after block.
+struct FloatSums {
+  using Lane = float;
+  static HWY_INLINE void add(Vector lane_sums, Vector, Lane* HWY_RESTRICT to) {
+    const FloatTag d;
+    hn::Store(hn::Add(hn::Load(d, to), lane_sums), d, to);
+  }
+  static void finish(const Lane* from, PartialCost& cost) {
+    for (std::size_t lane = 0; lane < lanes(); ++lane) cost.value += static_cast<double>(from[lane]);
+  }
+};
 
 /// Models per register tile: with fewer registers, fewer.
 constexpr std::size_t models_at_once() { return HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL ? 4 : 2; }
 
-template <class Model, Loss loss>
-HWY_INLINE void add_costs_of(const TileView& tile, const float* HWY_RESTRICT coefficients, std::size_t models,
-                             double* HWY_RESTRICT costs) {
-  constexpr std::size_t C = Model::traits.coefficient_count;
+template <class Model, Loss loss, class Sums, int P>
+HWY_INLINE void add_block(const TileView& tile, std::size_t block, Vector scale, const float* const* coefficients,
+                          typename Sums::Lane* const* sums) {
+  Vector total[P];
+  block_sums<Model, loss, P>(tile, block * kBlockPoints, coefficients, total);
+  for (int p = 0; p < P; ++p) Sums::add(total[p], scale, sums[p]);
+}
+
+/// One block and the listed models, as many at once as the registers hold.
+template <class Model, Loss loss, class Sums>
+HWY_INLINE void add_listed(const TileView& tile, std::size_t block, Vector scale, const float* const* coefficients,
+                           typename Sums::Lane* const* sums, std::size_t models) {
   constexpr std::size_t P = models_at_once();
-  HWY_ALIGN float sums[kGroupModels * kMaxLanes] = {};
-  for (std::size_t block = 0; block < tile.blocks; ++block) {
-    const std::size_t first = block * kBlockPoints;
-    std::size_t j = 0;
-    for (; j + P <= models; j += P) block_costs<Model, loss, P>(tile, first, coefficients + j * C, sums + j * lanes());
-    for (; j < models; ++j) block_costs<Model, loss, 1>(tile, first, coefficients + j * C, sums + j * lanes());
+  std::size_t j = 0;
+  for (; j + P <= models; j += P) add_block<Model, loss, Sums, P>(tile, block, scale, coefficients + j, sums + j);
+  for (; j < models; ++j) add_block<Model, loss, Sums, 1>(tile, block, scale, coefficients + j, sums + j);
+}
+
+/// `blocks`: null for all, else a bit a block for each model.
+template <class Model, Loss loss, class Sums>
+HWY_INLINE void add_costs_of(const TileView& tile, float scale, const float* HWY_RESTRICT coefficients, std::size_t models,
+                             const std::uint8_t* blocks, PartialCost* HWY_RESTRICT costs) {
+  using Lane = typename Sums::Lane;
+  constexpr std::size_t C = Model::traits.coefficient_count;
+  HWY_ALIGN Lane sums[kGroupModels * lanes()] = {};
+  const Vector scales = hn::Set(FloatTag(), scale);
+  const float* rows[kGroupModels];
+  Lane* places[kGroupModels];
+  std::size_t listed = 0;
+  const auto list = [&](std::size_t j) HWY_ATTR {
+    rows[listed] = coefficients + j * C;
+    places[listed] = sums + j * lanes();
+    ++listed;
+  };
+  if (blocks == nullptr) {
+    for (std::size_t j = 0; j < models; ++j) list(j);
   }
-  for (std::size_t j = 0; j < models; ++j) {
-    double total = 0;
-    for (std::size_t lane = 0; lane < lanes(); ++lane) total += sums[j * lanes() + lane];
-    costs[j] += total;
+  for (std::size_t block = 0; block < tile.blocks; ++block) {
+    if (blocks != nullptr) {
+      listed = 0;
+      for (std::size_t j = 0; j < models; ++j) {
+        if (((blocks[j] >> block) & 1U) != 0) list(j);
+      }
+    }
+    add_listed<Model, loss, Sums>(tile, block, scales, rows, places, listed);
+  }
+  for (std::size_t j = 0; j < models; ++j) Sums::finish(sums + j * lanes(), costs[j]);
+}
+
+void add_costs(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
+               PartialCost* costs) {
+  constexpr Loss l1 = Loss::truncated_l1, l2 = Loss::truncated_l2;
+  visit_model(kind, [&]<class Model>() HWY_ATTR {
+    if (summing.scale > 0) {
+      if (summing.loss == l1) return add_costs_of<Model, l1, QuantumSums>(tile, summing.scale, coefficients, models, nullptr, costs);
+      return add_costs_of<Model, l2, QuantumSums>(tile, summing.scale, coefficients, models, nullptr, costs);
+    }
+    if (summing.loss == l1) return add_costs_of<Model, l1, FloatSums>(tile, 0, coefficients, models, nullptr, costs);
+    return add_costs_of<Model, l2, FloatSums>(tile, 0, coefficients, models, nullptr, costs);
+  });
+}
+
+void add_open_costs(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
+                    const std::uint8_t* blocks, PartialCost* costs) {
+  constexpr Loss l1 = Loss::truncated_l1, l2 = Loss::truncated_l2;
+  visit_model(kind, [&]<class Model>() HWY_ATTR {
+    if (summing.loss == l1) return add_costs_of<Model, l1, QuantumSums>(tile, summing.scale, coefficients, models, blocks, costs);
+    return add_costs_of<Model, l2, QuantumSums>(tile, summing.scale, coefficients, models, blocks, costs);
+  });
+}
+
+/// In the same order as block_sums, with every loss at its limit.
+template <Loss loss>
+HWY_INLINE void cap_units_of(const TileView& tile, float scale, std::int32_t* units) {
+  const FloatTag d;
+  for (std::size_t block = 0; block < tile.blocks; ++block) {
+    Vector sum[2] = {hn::Zero(d), hn::Zero(d)};
+    const float* caps = tile.caps + block * kBlockPoints;
+    for (std::size_t i = 0; i < kBlockPoints; i += 2 * lanes()) {
+      for (std::size_t half = 0; half < 2; ++half) sum[half] = hn::Add(sum[half], limit_of<loss>(hn::Load(d, caps + i + half * lanes())));
+    }
+    HWY_ALIGN std::int32_t lane_units[lanes()] = {};
+    QuantumSums::add(hn::Add(sum[0], sum[1]), hn::Set(d, scale), lane_units);
+    units[block] = 0;
+    for (const std::int32_t lane : lane_units) units[block] += lane;
   }
 }
 
-void add_costs(ModelKind kind, Loss loss, const TileView& tile, const float* coefficients, std::size_t models, double* costs) {
-  visit_model(kind, [&]<class Model>() HWY_ATTR {
-    if (loss == Loss::truncated_l1) return add_costs_of<Model, Loss::truncated_l1>(tile, coefficients, models, costs);
-    return add_costs_of<Model, Loss::truncated_l2>(tile, coefficients, models, costs);
-  });
+void cap_units(const Summing& summing, const TileView& tile, std::int32_t* units) {
+  if (summing.loss == Loss::truncated_l1) return cap_units_of<Loss::truncated_l1>(tile, summing.scale, units);
+  cap_units_of<Loss::truncated_l2>(tile, summing.scale, units);
 }
 
 template <class Model>
@@ -131,6 +219,105 @@ void keep_nearest(const float* HWY_RESTRICT distance, const float* HWY_RESTRICT 
   }
 }
 
+using BlockTag = hn::CappedTag<float, kTileBlocks>;
+using BlockVector = hn::Vec<BlockTag>;
+
+/// The lower bound of a block's cost, of blocks side by side; see BlockBounds for the fields. With dmax the largest |d| that the box
+/// admits, min(|d|, c) >= |d| min(1, c / dmax), and sum |d| is at least |sum s_i d_i| for any signs, and sum d^2 / dmax.
+template <class Model, Loss loss>
+struct BlockBounder {
+  static constexpr std::size_t D = Model::traits.dimension;
+  const TileBounds& tile;
+  std::size_t at;
+
+  HWY_INLINE BlockVector load(std::size_t field) const { return hn::Load(BlockTag(), tile.field[field] + at); }
+  HWY_INLINE BlockVector dot(const BlockVector* k, std::size_t field) const {
+    BlockVector sum = hn::Mul(k[0], load(field));
+    for (std::size_t c = 1; c < D; ++c) sum = hn::MulAdd(k[c], load(field + c), sum);
+    return sum;
+  }
+
+  struct Answer {
+    hn::Mask<BlockTag> beyond, within;
+    BlockVector least;
+  };
+
+  HWY_INLINE Answer operator()(const BlockVector* k, BlockVector slack) const {
+    const BlockTag d;
+    const BlockVector zero = hn::Zero(d), one = hn::Set(d, 1.0F);
+    const BlockVector count = load(Field::count), least_cap = load(Field::least_cap), most_cap = load(Field::most_cap);
+    const BlockVector middle = hn::Add(dot(k, Field::mean), k[D]);
+    BlockVector reach = slack, variance = zero;
+    for (std::size_t e = 0; e < D; ++e) {
+      const BlockVector along = dot(k, Field::axis + 3 * e);
+      reach = hn::Add(reach, hn::Abs(along));
+      variance = hn::MulAdd(hn::Mul(along, along), load(Field::spread + e), variance);
+    }
+    const BlockVector nearest = hn::Max(hn::Sub(hn::Abs(middle), reach), zero);
+    const BlockVector farthest = hn::Add(hn::Abs(middle), reach);
+    const BlockVector square = hn::Mul(count, hn::MulAdd(middle, middle, variance));
+    const BlockVector share = hn::Min(one, hn::Div(least_cap, farthest));
+    const BlockVector cap_share = hn::Min(one, hn::Div(nearest, most_cap));
+    BlockVector least;
+    if (loss == Loss::truncated_l1) {
+      BlockVector sum = hn::Max(hn::Mul(count, hn::Abs(middle)), hn::Div(square, farthest));
+      for (std::size_t s = 0; s < D; ++s) {
+        sum = hn::Max(sum, hn::Abs(hn::MulAdd(load(Field::sign_sum + s), middle, dot(k, Field::signed_offset + 3 * s))));
+      }
+      sum = hn::Mul(hn::NegMulAdd(count, slack, sum), share);
+      least = hn::Max(sum, hn::Mul(load(Field::cap_sum), cap_share));
+    } else {
+      const BlockVector rounding = hn::Mul(hn::Mul(hn::Set(d, 2.0F), hn::Mul(slack, farthest)), count);
+      least = hn::Mul(hn::Sub(square, rounding), hn::Mul(share, share));
+    }
+    // A thousandth of a percent for the rounding of all the above and of the sums that it is compared with.
+    least = hn::Mul(hn::Max(least, zero), hn::Set(d, 1.0F - 1e-5F));
+    return {hn::Gt(hn::Sub(hn::Abs(middle), reach), most_cap), hn::Le(farthest, least_cap), least};
+  }
+};
+
+template <class Model, Loss loss>
+HWY_INLINE void bound_of(const TileBounds& tile, const float* HWY_RESTRICT coefficients, const float* HWY_RESTRICT slack,
+                         std::size_t models, Open* HWY_RESTRICT open, PartialBound* HWY_RESTRICT bounds) {
+  constexpr std::size_t C = Model::traits.coefficient_count;
+  const BlockTag d;
+  const hn::RebindToSigned<BlockTag> di;
+  for (std::size_t j = 0; j < models; ++j) {
+    BlockVector k[C];
+    for (std::size_t c = 0; c < C; ++c) k[c] = hn::Set(d, coefficients[j * C + c]);
+    BlockVector within_sum = hn::Zero(d), mixed_sum = hn::Zero(d);
+    auto settled = hn::Zero(di);
+    unsigned within_bits = 0, beyond_bits = 0;
+    for (std::size_t at = 0; at < kTileBlocks; at += hn::Lanes(d)) {
+      const auto answer = BlockBounder<Model, loss>{tile, at}(k, hn::Set(d, slack[j]));
+      const auto beyond = hn::VecFromMask(d, answer.beyond), within = hn::VecFromMask(d, answer.within);
+      settled = hn::Add(settled, hn::And(hn::BitCast(di, beyond), hn::Load(di, tile.cap_units + at)));
+      within_sum = hn::Add(within_sum, hn::AndNot(beyond, hn::And(within, answer.least)));
+      mixed_sum = hn::Add(mixed_sum, hn::AndNot(beyond, hn::AndNot(within, answer.least)));
+      HWY_ALIGN std::uint8_t bits[8] = {};
+      hn::StoreMaskBits(d, answer.beyond, bits);
+      beyond_bits |= static_cast<unsigned>(bits[0]) << at;
+      hn::StoreMaskBits(d, answer.within, bits);
+      within_bits |= static_cast<unsigned>(bits[0]) << at;
+    }
+    bounds[j].settled += hn::GetLane(hn::SumOfLanes(di, settled));
+    bounds[j].within += static_cast<double>(hn::GetLane(hn::SumOfLanes(d, within_sum)));
+    bounds[j].mixed += static_cast<double>(hn::GetLane(hn::SumOfLanes(d, mixed_sum)));
+    open[j].within = static_cast<std::uint8_t>(within_bits & ~beyond_bits);
+    open[j].mixed = static_cast<std::uint8_t>(~(within_bits | beyond_bits));
+  }
+}
+
+void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models,
+           Open* open, PartialBound* bounds) {
+  visit_model(kind, [&]<class Model>() HWY_ATTR {
+    if constexpr (Model::traits.affine) {
+      if (loss == Loss::truncated_l1) return bound_of<Model, Loss::truncated_l1>(tile, coefficients, slack, models, open, bounds);
+      return bound_of<Model, Loss::truncated_l2>(tile, coefficients, slack, models, open, bounds);
+    }
+  });
+}
+
 /// As many chains as hide the latency of two multiply-adds a cycle and still fit the registers.
 double spin_fma(std::size_t rounds, float* sink) {
   const FloatTag d;
@@ -155,7 +342,7 @@ double spin_fma(std::size_t rounds, float* sink) {
 }
 
 const CpuKernels& kernel_table() {
-  static const CpuKernels table{hwy::TargetName(HWY_TARGET), lanes(), add_costs, distances, keep_nearest, spin_fma};
+  static const CpuKernels table{hwy::TargetName(HWY_TARGET), lanes(), add_costs, add_open_costs, cap_units, bound, distances, keep_nearest, spin_fma};
   return table;
 }
 

@@ -6,19 +6,27 @@
 #include <string>
 #include <vector>
 
+#include "kernels/blocks.hpp"
 #include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::kernels::cpu {
 
-/// Points per block: the unit in which costs are summed, and the least that is ever skipped. A multiple of every vector's lanes.
-inline constexpr std::size_t kBlockPoints = 256;
-/// Blocks per tile: a tile's coordinates and caps stay in the first-level cache while a group of models passes over them.
+/// Blocks per tile: a tile's coordinates and caps stay in the first-level cache while a group of models passes over them, and a byte
+/// holds one bit for each of its blocks.
 inline constexpr std::size_t kTileBlocks = 8;
 inline constexpr std::size_t kTilePoints = kBlockPoints * kTileBlocks;
 /// Most lanes of any vector.
 inline constexpr std::size_t kMaxLanes = 16;
 /// Models whose partial sums are kept side by side while they pass over a tile.
 inline constexpr std::size_t kGroupModels = 32;
+
+/// A model's cost over part of the cloud. In the exact form, `units` counts quanta: a block's lane sums are rounded to whole ones, so that
+/// sums over blocks may be taken in any order, and by any number of threads, with the same outcome. Where caps are so much larger than
+/// the cloud that quanta would be too coarse, `value` adds up floating point in a fixed order instead.
+struct PartialCost {
+  std::int64_t units = 0;
+  double value = 0;
+};
 
 /// Columns of points, aligned to a cache line, and their caps: where a tile starts.
 struct TileView {
@@ -27,13 +35,56 @@ struct TileView {
   std::size_t blocks = 0;
 };
 
+/// How losses are summed: `scale` quanta a unit of cost, or 0 for floating point. A block's losses stay below 2^27 quanta.
+struct Summing {
+  Loss loss = Loss::truncated_l1;
+  float scale = 0;
+};
+
+/// Where the fields of BlockBounds lie in TileBounds.
+struct Field {
+  static constexpr std::size_t count = 0, least_cap = 1, most_cap = 2, cap_sum = 3, mean = 4, axis = 7, spread = 16, signed_offset = 19,
+                               sign_sum = 28, all = 31;
+};
+
+/// Bounds of a tile's blocks side by side. Blocks that are not there are beyond every model's reach and cost nothing.
+struct TileBounds {
+  alignas(64) float field[Field::all][kTileBlocks];
+  alignas(64) std::int32_t cap_units[kTileBlocks];  ///< cost of a block whose points are all beyond their caps
+};
+
+/// What is known of a model over part of the cloud before any point is touched.
+struct PartialBound {
+  std::int64_t settled = 0;   ///< quanta of blocks beyond the caps
+  double within = 0;          ///< lower bound over blocks that lie within the caps
+  double mixed = 0;           ///< lower bound over the others
+};
+
+/// A model's blocks of a tile that must be looked at, a bit each.
+struct Open {
+  std::uint8_t within = 0;
+  std::uint8_t mixed = 0;
+};
+
 struct CpuKernels {
   const char* name;
   std::size_t lanes;
 
-  /// costs[j] += sum of the losses of the tile's points to model j, for at most kGroupModels models with `coefficients` row after row.
-  /// A model's sum does not depend on the others.
-  void (*add_costs)(ModelKind kind, Loss loss, const TileView& tile, const float* coefficients, std::size_t models, double* costs);
+  /// costs[j] += the losses of the tile's points to model j, for at most kGroupModels models with `coefficients` row after row. A model's
+  /// sum does not depend on the others.
+  void (*add_costs)(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
+                    PartialCost* costs);
+
+  /// The same over those blocks of the tile whose bit is set in blocks[j]; exact form only.
+  void (*add_open_costs)(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
+                         const std::uint8_t* blocks, PartialCost* costs);
+
+  /// Quanta of each block of the tile for a model that explains none of its points; exact form only.
+  void (*cap_units)(const Summing& summing, const TileView& tile, std::int32_t* units);
+
+  /// Bounds of affine models over a tile. slack[j] is what rounding may do to a distance of model j.
+  void (*bound)(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models,
+                Open* open, PartialBound* bounds);
 
   /// |dist| of the tile's points to one model.
   void (*distances)(ModelKind kind, const TileView& tile, const float* coefficients, float* out);
@@ -48,5 +99,8 @@ struct CpuKernels {
 
 /// Best first: what this build knows and this processor can run. Never empty.
 const std::vector<const CpuKernels*>& available_kernels();
+
+/// Bounds of one block into its place.
+void pack_bounds(const BlockBounds& block, std::size_t at, TileBounds& tile);
 
 }  // namespace swarmfit::kernels::cpu

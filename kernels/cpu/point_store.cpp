@@ -4,18 +4,15 @@
 #include <cmath>
 #include <cstring>
 
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
 
 namespace swarmfit::kernels::cpu {
 namespace {
 
 /// Rows a task reads. Fixed, so that the centre does not depend on the number of threads.
 constexpr std::size_t kChunkRows = 16384;
-
-struct ChunkSummary {
-  std::size_t finite = 0;
-  std::array<double, kMaxDimension> sum{};
-};
 
 /// Calls visit(row, values) for each finite row in [first, last), with `values` its columns as double.
 template <class S, class Visit>
@@ -48,55 +45,132 @@ void visit_chunk(const PointsView& points, std::size_t chunk, Visit&& visit) {
 void PointStore::assign(const PointsView& points) {
   dimension_ = points.dimension;
   count_ = points.count;
-  const std::size_t chunks = (count_ + kChunkRows - 1) / kChunkRows;
-  std::vector<ChunkSummary> summaries(chunks);
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    ChunkSummary summary;
+  most_cap_ = 0;
+  bounds_current_ = false;
+  std::vector<Chunk> chunks((count_ + kChunkRows - 1) / kChunkRows);
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t chunk) {
+    Chunk summary;
     visit_chunk(points, chunk, [&](std::size_t, const std::array<double, kMaxDimension>& x) {
       ++summary.finite;
       for (std::size_t c = 0; c < kMaxDimension; ++c) summary.sum[c] += x[c];
     });
-    summaries[chunk] = summary;
+    chunks[chunk] = summary;
   });
 
   // The mean lies where most points are: one stray point far away must not cost the others their precision.
-  std::vector<std::size_t> starts(chunks);
   finite_ = 0;
   centre_ = {};
-  for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-    starts[chunk] = finite_;
-    finite_ += summaries[chunk].finite;
+  for (Chunk& chunk : chunks) {
+    chunk.start = finite_;
+    finite_ += chunk.finite;
   }
-  for (const ChunkSummary& summary : summaries) {
-    for (std::size_t c = 0; c < kMaxDimension; ++c) centre_[c] += summary.sum[c] / static_cast<double>(finite_ > 0 ? finite_ : 1);
+  for (const Chunk& chunk : chunks) {
+    for (std::size_t c = 0; c < kMaxDimension; ++c) centre_[c] += chunk.sum[c] / static_cast<double>(finite_ > 0 ? finite_ : 1);
   }
+  keep_finite(points, chunks);
+  if (dimension_ <= 3 && blocks_ > 1) sort();
+}
 
+void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunks) {
   blocks_ = (finite_ + kBlockPoints - 1) / kBlockPoints;
   const std::size_t padded = blocks_ * kBlockPoints;
   const auto width = static_cast<std::size_t>(dimension_);
   for (std::size_t c = 0; c < kMaxDimension; ++c) columns_[c].resize(c < width ? padded : 0);
   caps_.assign(padded, 0.0F);
   input_.resize(finite_ == count_ ? 0 : finite_);
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    std::size_t position = starts[chunk];
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t chunk) {
+    std::size_t position = chunks[chunk].start;
     visit_chunk(points, chunk, [&](std::size_t row, const std::array<double, kMaxDimension>& x) {
-      for (std::size_t c = 0; c < width; ++c) columns_[c][position] = static_cast<float>(x[c] - centre_[c]);
+      for (std::size_t c = 0; c < width; ++c) {
+        const auto centred = static_cast<float>(x[c] - centre_[c]);
+        columns_[c][position] = centred;
+        chunks[chunk].reach[c] = std::max(chunks[chunk].reach[c], std::abs(centred));
+      }
       if (!input_.empty()) input_[position] = static_cast<std::uint32_t>(row);
       ++position;
     });
   });
+  reach_ = {};
+  for (const Chunk& chunk : chunks) {
+    for (std::size_t c = 0; c < width; ++c) reach_[c] = std::max(reach_[c], chunk.reach[c]);
+  }
   for (std::size_t c = 0; c < width; ++c) std::fill(columns_[c].begin() + static_cast<std::ptrdiff_t>(finite_), columns_[c].end(), 0.0F);
 }
 
+void PointStore::sort() {
+  const auto width = static_cast<std::size_t>(dimension_);
+  std::array<const float*, kMaxDimension> columns{};
+  for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
+  const std::span<const std::uint32_t> order = order_.sort(std::span(columns).first(width), finite_);
+  const auto each = [&](auto&& body) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, finite_, kChunkRows), [&](const tbb::blocked_range<std::size_t>& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+    });
+  };
+  for (std::size_t c = 0; c < width; ++c) {
+    unsorted_.resize(columns_[c].size());
+    unsorted_.swap(columns_[c]);
+    std::fill(columns_[c].begin() + static_cast<std::ptrdiff_t>(finite_), columns_[c].end(), 0.0F);
+    each([&](std::size_t i) { columns_[c][i] = unsorted_[order[i]]; });
+  }
+  unsorted_input_.swap(input_);
+  input_.resize(finite_);
+  if (unsorted_input_.empty()) {
+    each([&](std::size_t i) { input_[i] = order[i]; });
+  } else {
+    each([&](std::size_t i) { input_[i] = unsorted_input_[order[i]]; });
+  }
+}
+
 void PointStore::set_caps(std::span<const float> caps) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, finite_, kChunkRows), [&](const tbb::blocked_range<std::size_t>& range) {
-    if (input_.empty()) {
-      std::copy(caps.begin() + static_cast<std::ptrdiff_t>(range.begin()), caps.begin() + static_cast<std::ptrdiff_t>(range.end()),
-                caps_.begin() + static_cast<std::ptrdiff_t>(range.begin()));
-    } else {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) caps_[i] = caps[input_[i]];
+  bounds_current_ = false;
+  most_cap_ = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, finite_, kChunkRows), 0.0F,
+      [&](const tbb::blocked_range<std::size_t>& range, float most) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+          caps_[i] = caps[input_index(i)];
+          most = std::max(most, caps_[i]);
+        }
+        return most;
+      },
+      [](float a, float b) { return std::max(a, b); });
+}
+
+Summing PointStore::summing(Loss loss) const noexcept {
+  // Caps much larger than the cloud truncate nothing, and their quanta would be coarse against the distances.
+  constexpr double kMostCapsPerReach = 4;
+  constexpr double kQuantaPerLoss = static_cast<double>(std::int64_t{1} << 27) / static_cast<double>(kBlockPoints);
+  double square = 0;
+  for (const float r : reach_) square += static_cast<double>(r) * static_cast<double>(r);
+  const double cap = static_cast<double>(most_cap_);
+  const double limit = loss == Loss::truncated_l1 ? cap : cap * cap;
+  if (limit == 0) return {loss, 1.0F};
+  const double scale = std::exp2(std::floor(std::log2(kQuantaPerLoss / limit)));
+  const bool coarse = cap > kMostCapsPerReach * std::sqrt(square);
+  const bool representable = scale > 1e-30 && scale < 1e30;
+  return {loss, coarse || !representable ? 0.0F : static_cast<float>(scale)};
+}
+
+void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summing) {
+  if (bounds_current_ && bounds_summing_.loss == summing.loss && bounds_summing_.scale == summing.scale) return;
+  bounds_.resize(tiles());
+  tbb::parallel_for(std::size_t{0}, tiles(), [&](std::size_t index) {
+    const TileView view = tile(index);
+    TileBounds& bounds = bounds_[index];
+    for (std::size_t block = 0; block < kTileBlocks; ++block) {
+      BlockBounds one;
+      if (block < view.blocks) {
+        std::array<const float*, kMaxDimension> columns{};
+        for (std::size_t c = 0; c < static_cast<std::size_t>(dimension_); ++c) columns[c] = view.columns[c] + block * kBlockPoints;
+        one = bound_block(columns.data(), view.caps + block * kBlockPoints, dimension_);
+      }
+      pack_bounds(one, block, bounds);
+      bounds.cap_units[block] = 0;
     }
+    kernels.cap_units(summing, view, bounds.cap_units);
   });
+  bounds_current_ = true;
+  bounds_summing_ = summing;
 }
 
 TileView PointStore::tile(std::size_t index) const noexcept {
@@ -106,6 +180,22 @@ TileView PointStore::tile(std::size_t index) const noexcept {
   view.caps = caps_.data() + first;
   view.blocks = std::min(kTileBlocks, blocks_ - index * kTileBlocks);
   return view;
+}
+
+void pack_bounds(const BlockBounds& block, std::size_t at, TileBounds& tile) {
+  tile.field[Field::count][at] = block.count;
+  tile.field[Field::least_cap][at] = block.least_cap;
+  tile.field[Field::most_cap][at] = block.most_cap;
+  tile.field[Field::cap_sum][at] = block.cap_sum;
+  for (std::size_t c = 0; c < 3; ++c) {
+    tile.field[Field::mean + c][at] = block.mean[c];
+    tile.field[Field::spread + c][at] = block.spread[c];
+    tile.field[Field::sign_sum + c][at] = block.sign_sum[c];
+    for (std::size_t e = 0; e < 3; ++e) {
+      tile.field[Field::axis + 3 * e + c][at] = block.axis[e][c];
+      tile.field[Field::signed_offset + 3 * e + c][at] = block.signed_offset[e][c];
+    }
+  }
 }
 
 }  // namespace swarmfit::kernels::cpu

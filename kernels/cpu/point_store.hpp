@@ -1,4 +1,4 @@
-// Points as the CPU back end keeps them: finite ones only, centred in double, then float in columns, padded to whole blocks.
+// Points as the CPU back end keeps them: finite ones only, centred in double, then float in columns, in blocks of neighbours, padded.
 #pragma once
 
 #include <array>
@@ -8,38 +8,64 @@
 
 #include <oneapi/tbb/cache_aligned_allocator.h>
 
+#include "kernels/blocks.hpp"
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::kernels::cpu {
 
-using AlignedFloats = std::vector<float, tbb::cache_aligned_allocator<float>>;
+template <class T>
+using Aligned = std::vector<T, tbb::cache_aligned_allocator<T>>;
 
 class PointStore {
  public:
-  /// Runs inside the caller's task arena. The points must be valid (check_points).
+  /// Runs inside the caller's task arena, as all that follows. The points must be valid (check_points).
   void assign(const PointsView& points);
   /// One cap a point, in input order; size and values must be valid.
   void set_caps(std::span<const float> caps);
+  /// How losses are to be summed under the caps.
+  Summing summing(Loss loss) const noexcept;
+  /// Brings bounds() up to date with the caps. Exact form of `summing` only.
+  void prepare_bounds(const CpuKernels& kernels, const Summing& summing);
 
   int dimension() const noexcept { return dimension_; }
   std::size_t count() const noexcept { return count_; }      ///< points given
   std::size_t finite() const noexcept { return finite_; }    ///< points kept
   std::size_t tiles() const noexcept { return (blocks_ + kTileBlocks - 1) / kTileBlocks; }
   TileView tile(std::size_t index) const noexcept;
+  const TileBounds& bounds(std::size_t tile) const noexcept { return bounds_[tile]; }
   const double* centre() const noexcept { return centre_.data(); }
+  /// Largest |coordinate| about the centre, a column.
+  const std::array<float, kMaxDimension>& reach() const noexcept { return reach_; }
   /// Where the kept point at `position` stands in the input.
   std::size_t input_index(std::size_t position) const noexcept { return input_.empty() ? position : input_[position]; }
 
  private:
+  struct Chunk {
+    std::size_t finite = 0, start = 0;
+    std::array<double, kMaxDimension> sum{};
+    std::array<float, kMaxDimension> reach{};
+  };
+
+  void keep_finite(const PointsView& points, std::vector<Chunk>& chunks);
+  void sort();
+
   int dimension_ = 0;
   std::size_t count_ = 0;
   std::size_t finite_ = 0;
   std::size_t blocks_ = 0;
   std::array<double, kMaxDimension> centre_{};
-  std::array<AlignedFloats, kMaxDimension> columns_;
-  AlignedFloats caps_;
+  std::array<float, kMaxDimension> reach_{};
+  std::array<Aligned<float>, kMaxDimension> columns_;
+  Aligned<float> caps_;
+  float most_cap_ = 0;
   std::vector<std::uint32_t> input_;  ///< empty where it would be the identity
+  MortonOrder order_;
+  Aligned<float> unsorted_;
+  std::vector<std::uint32_t> unsorted_input_;
+  Aligned<TileBounds> bounds_;
+  bool bounds_current_ = false;
+  Summing bounds_summing_;
 };
 
 }  // namespace swarmfit::kernels::cpu

@@ -1,7 +1,7 @@
 // line2d: a x + b y + offset = 0, a^2 + b^2 = 1. GLSL twin: shaders/models/line2d.glsl. Included by models.inl only.
 struct Line2d {
   static constexpr ModelKind kind = ModelKind::line2d;
-  static constexpr ModelTraits traits{"line2d", 2, 3, 3, 2};
+  static constexpr ModelTraits traits{"line2d", 2, 3, 3, 2, true};
 
   static void centre(const double* p, const double* c, double* k) {
     k[0] = p[0];

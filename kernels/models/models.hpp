@@ -23,6 +23,7 @@ struct ModelTraits {
   int parameter_count = 0;    ///< doubles in the data's frame, as results give them
   int coefficient_count = 0;  ///< scalars in the centred frame, as kernels read them
   int multiply_adds = 0;      ///< fused multiply-adds of one residual: what the machine's limit is divided by
+  bool affine = false;        ///< the residual is n . x + offset with coefficients n, offset: boxes bound it
 };
 
 const ModelTraits& traits(ModelKind kind) noexcept;

@@ -1,7 +1,7 @@
 // plane: normal . x + offset = 0, |normal| = 1. GLSL twin: shaders/models/plane.glsl. Included by models.inl only.
 struct Plane {
   static constexpr ModelKind kind = ModelKind::plane;
-  static constexpr ModelTraits traits{"plane", 3, 4, 4, 3};
+  static constexpr ModelTraits traits{"plane", 3, 4, 4, 3, true};
 
   static void centre(const double* p, const double* c, double* k) {
     k[0] = p[0];

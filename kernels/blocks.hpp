@@ -1,0 +1,49 @@
+// Spatial blocks: runs of points that lie close together, so that one bound speaks for all of them (design 2.3).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "kernels/models/models.hpp"
+
+namespace swarmfit::kernels {
+
+/// Points of a block. The last one of a cloud is padded.
+inline constexpr std::size_t kBlockPoints = 256;
+
+/// Positions in Morton order: neighbours in the list are neighbours in space. `columns` hold `count` finite coordinates each, 2 or 3 of
+/// them. A stable parallel radix sort over cells; points far from where most are share the outermost cells. Works in the caller's arena.
+class MortonOrder {
+ public:
+  std::span<const std::uint32_t> sort(std::span<const float* const> columns, std::size_t count);
+
+ private:
+  std::vector<std::uint64_t> entries_, scratch_;  // key in the upper half, position in the lower
+  std::vector<std::uint32_t> histogram_, order_;
+};
+
+/// The box of a block and sums from which costs are bounded, over the points whose cap is not 0; everything in float, with room left for
+/// its rounding by the user. Axes are the principal ones, so that a patch of a plane has a flat box.
+struct BlockBounds {
+  static constexpr int kSigns = 3;
+  float count = 0;                                    ///< points with a cap > 0
+  float mean[3] = {};
+  float axis[3][3] = {};                              ///< principal axes, each as long as the box's half extent about the mean
+  float spread[3] = {};                               ///< variance along the axis over the square of its length
+  float least_cap = 0;                                ///< of caps > 0
+  float most_cap = -std::numeric_limits<float>::infinity();
+  float cap_sum = 0;
+  /// For signs s_i of +1 and -1, |sum s_i d_i| <= sum |d_i|: sum s_i (x_i - mean) and sum s_i. The signs are those of the points'
+  /// offsets along the principal axes; the flattest axis tells the noise, which no plane can go below.
+  float signed_offset[kSigns][3] = {};
+  float sign_sum[kSigns] = {};
+};
+
+/// `columns` and `caps` start at the block and hold kBlockPoints values; `dimension` is 2 or 3.
+BlockBounds bound_block(const float* const* columns, const float* caps, int dimension);
+
+}  // namespace swarmfit::kernels

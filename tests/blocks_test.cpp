@@ -1,0 +1,289 @@
+// Pruning changes nothing: with it, a cost below its cutoff is the same bytes as without, and any other lies between cutoff and truth.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "kernels/blocks.hpp"
+#include "kernels/cpu/cpu_kernels.hpp"
+#include "kernels/evaluators.hpp"
+
+namespace swarmfit::kernels {
+namespace {
+
+struct Scene {
+  ModelKind kind = ModelKind::plane;
+  std::vector<float> points;
+  std::vector<float> caps;
+  std::vector<double> swarm;
+  std::size_t particles = 0;
+
+  int dimension() const { return traits(kind).dimension; }
+  PointsView view() const {
+    const auto width = static_cast<std::size_t>(dimension());
+    return {points.data(), Scalar::float32, dimension(), points.size() / width, sizeof(float) * width};
+  }
+};
+
+/// Flat patches of all sizes with noise, clutter, duplicates, points that are not finite; caps of several shapes; models near the patches,
+/// far from them, and anywhere.
+Scene random_scene(ModelKind kind, unsigned seed, std::size_t count, std::size_t particles) {
+  std::mt19937 engine(seed);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine); };
+  Scene scene;
+  scene.kind = kind;
+  scene.particles = particles;
+  const auto width = static_cast<std::size_t>(scene.dimension());
+  const double origin = seed % 4 == 3 ? 1000.0 : 0.0;
+  const double noise = std::pow(10.0, uniform(-5, -1.5));
+
+  std::vector<std::vector<double>> flats;
+  const auto random_flat = [&] {
+    std::vector<double> flat(width + 1);
+    double norm = 0;
+    for (std::size_t c = 0; c < width; ++c) {
+      flat[c] = uniform(-1, 1);
+      norm += flat[c] * flat[c];
+    }
+    norm = std::sqrt(norm) + 1e-12;
+    for (std::size_t c = 0; c < width; ++c) flat[c] /= norm;
+    flat[width] = uniform(-1, 1);
+    for (std::size_t c = 0; c < width; ++c) flat[width] -= flat[c] * origin;
+    return flat;
+  };
+  for (int k = 0; k < 4; ++k) flats.push_back(random_flat());
+
+  const double clutter = uniform(0, 0.6);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::vector<double> x(width);
+    for (double& v : x) v = origin + uniform(-2, 2);
+    if (uniform(0, 1) > clutter) {
+      const std::vector<double>& flat = flats[seed % 3 == 0 ? 0 : i % flats.size()];
+      double d = flat[width] + uniform(-noise, noise);
+      for (std::size_t c = 0; c < width; ++c) d += flat[c] * x[c];
+      for (std::size_t c = 0; c < width; ++c) x[c] -= flat[c] * d;
+    }
+    if (uniform(0, 1) < 0.01) x[0] = std::numeric_limits<double>::quiet_NaN();
+    for (const double v : x) scene.points.push_back(static_cast<float>(v));
+  }
+  for (std::size_t i = 0; i + 1 < count / 10; ++i) {
+    for (std::size_t c = 0; c < width; ++c) scene.points[(i + 1) * width + c] = scene.points[c];
+  }
+
+  const double tau = std::pow(10.0, uniform(-3, -0.5));
+  for (std::size_t i = 0; i < count; ++i) {
+    double cap = tau;
+    if (seed % 5 == 1) cap = uniform(0, tau);
+    if (seed % 5 == 2 && i % 2 == 0) cap = 0;
+    if (seed % 5 == 4) cap = i < count / 3 ? 0 : tau * (i % 7 == 0 ? 3 : 1);
+    scene.caps.push_back(static_cast<float>(cap));
+  }
+  for (std::size_t j = 0; j < particles; ++j) {
+    std::vector<double> model = j % 3 == 0 ? random_flat() : flats[j % flats.size()];
+    const double shake = j % 3 == 2 ? std::pow(10.0, uniform(-5, -1)) : 0;
+    for (double& v : model) v += shake * uniform(-1, 1);
+    scene.swarm.insert(scene.swarm.end(), model.begin(), model.end());
+  }
+  return scene;
+}
+
+std::unique_ptr<FitnessEvaluator> make(bool pruning, int threads = 2, const std::string& simd = "") {
+  EvaluatorOptions options;
+  options.pruning = pruning;
+  options.threads = threads;
+  options.simd = simd;
+  auto made = make_cpu_evaluator(options);
+  EXPECT_TRUE(made);
+  return std::move(*made);
+}
+
+std::vector<float> costs_of(FitnessEvaluator& evaluator, const Scene& scene, Loss loss, const std::vector<float>& cutoffs) {
+  std::vector<float> costs(scene.particles, -1.0F);
+  const auto done = evaluator.evaluate({scene.kind, scene.particles, scene.swarm}, loss, cutoffs, costs);
+  EXPECT_TRUE(done) << done.error().message;
+  return costs;
+}
+
+void load(FitnessEvaluator& evaluator, const Scene& scene) {
+  ASSERT_TRUE(evaluator.set_points(scene.view()));
+  ASSERT_TRUE(evaluator.set_caps(scene.caps));
+}
+
+class Pruning : public testing::TestWithParam<std::tuple<ModelKind, Loss>> {};
+
+TEST_P(Pruning, CostsBelowTheirCutoffsAreTheSameBytes) {
+  const auto [kind, loss] = GetParam();
+  std::uint64_t touched = 0, asked = 0;
+  std::size_t lost = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const Scene scene = random_scene(kind, seed, 12000 + 577 * seed, 96 + seed % 5);
+    const auto brute = make(false), pruned = make(true);
+    load(*brute, scene);
+    load(*pruned, scene);
+    const std::vector<float> truth = costs_of(*brute, scene, loss, {});
+    EXPECT_EQ(truth, costs_of(*pruned, scene, loss, {})) << "seed " << seed;
+    std::mt19937 engine(seed);
+    for (const double least : {0.5, 0.9, 0.999, 1.0, 1.001}) {
+      std::vector<float> cutoffs;
+      for (const float t : truth) {
+        cutoffs.push_back(t * static_cast<float>(least + std::uniform_real_distribution<double>(0, 0.05)(engine)));
+      }
+      const std::vector<float> costs = costs_of(*pruned, scene, loss, cutoffs);
+      for (std::size_t j = 0; j < costs.size(); ++j) {
+        if (truth[j] < cutoffs[j]) {
+          EXPECT_EQ(costs[j], truth[j]) << "seed " << seed << " model " << j;
+        } else {
+          EXPECT_GE(costs[j], cutoffs[j]) << "seed " << seed << " model " << j;
+          EXPECT_LE(costs[j], truth[j]) << "seed " << seed << " model " << j;
+          lost += costs[j] < truth[j];
+        }
+      }
+    }
+    touched += pruned->effort().touched;
+    asked += pruned->effort().point_models;
+    EXPECT_EQ(brute->effort().touched, brute->effort().point_models);
+  }
+  EXPECT_GT(lost, 100U);           // the cutoffs did settle models early
+  EXPECT_LT(touched, asked / 4 * 3);   // and blocks were left out
+}
+
+TEST_P(Pruning, SameBytesOnAnyThreadsAndEachInstructionSet) {
+  const auto [kind, loss] = GetParam();
+  const Scene scene = random_scene(kind, 8, 30000, 64);
+  for (const cpu::CpuKernels* kernels : cpu::available_kernels()) {
+    const auto brute = make(false, 1, kernels->name);
+    load(*brute, scene);
+    const std::vector<float> truth = costs_of(*brute, scene, loss, {});
+    for (const int threads : {1, 2, 5}) {
+      for (const bool pruning : {false, true}) {
+        const auto other = make(pruning, threads, kernels->name);
+        load(*other, scene);
+        EXPECT_EQ(truth, costs_of(*other, scene, loss, {})) << kernels->name << " " << threads << " threads, pruning " << pruning;
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, Pruning,
+                         testing::Combine(testing::ValuesIn(kModelKinds), testing::Values(Loss::truncated_l1, Loss::truncated_l2)));
+
+TEST(PruningEdges, ModelsThatAreNotFiniteCostInfinity) {
+  Scene scene = random_scene(ModelKind::plane, 3, 20000, 64);
+  scene.swarm[4 * 7 + 1] = std::numeric_limits<double>::quiet_NaN();
+  scene.swarm[4 * 9 + 3] = std::numeric_limits<double>::infinity();
+  const auto pruned = make(true), brute = make(false);
+  load(*pruned, scene);
+  load(*brute, scene);
+  const std::vector<float> costs = costs_of(*pruned, scene, Loss::truncated_l1, std::vector<float>(64, 1.0F));
+  EXPECT_EQ(costs[7], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(costs[9], std::numeric_limits<float>::infinity());
+  EXPECT_EQ(costs_of(*pruned, scene, Loss::truncated_l1, {}), costs_of(*brute, scene, Loss::truncated_l1, {}));
+}
+
+TEST(PruningEdges, CapsFarBeyondTheCloudAreSummedAlike) {
+  Scene scene = random_scene(ModelKind::plane, 2, 20000, 64);
+  std::fill(scene.caps.begin(), scene.caps.end(), std::numeric_limits<float>::max() / 1e9F);
+  const auto pruned = make(true), brute = make(false);
+  load(*pruned, scene);
+  load(*brute, scene);
+  const std::vector<float> truth = costs_of(*brute, scene, Loss::truncated_l1, {});
+  EXPECT_EQ(costs_of(*pruned, scene, Loss::truncated_l1, {}), truth);
+  EXPECT_GT(*std::max_element(truth.begin(), truth.end()), 100.0F);  // plain sums of distances, not all rounded away
+}
+
+TEST(PruningEdges, NewCapsAreHeeded) {
+  Scene scene = random_scene(ModelKind::plane, 6, 40000, 64);
+  const auto pruned = make(true), brute = make(false);
+  load(*pruned, scene);
+  load(*brute, scene);
+  costs_of(*pruned, scene, Loss::truncated_l1, {});
+  for (std::size_t i = 0; i < scene.caps.size(); ++i) scene.caps[i] = i % 3 == 0 ? 0.0F : 2 * scene.caps[i];
+  ASSERT_TRUE(pruned->set_caps(scene.caps));
+  ASSERT_TRUE(brute->set_caps(scene.caps));
+  EXPECT_EQ(costs_of(*pruned, scene, Loss::truncated_l1, {}), costs_of(*brute, scene, Loss::truncated_l1, {}));
+}
+
+TEST(MortonOrder, IsAPermutationOfNeighbours) {
+  for (const std::size_t dimensions : {2U, 3U}) {
+    std::mt19937 engine(5);
+    constexpr std::size_t kCount = 50000;
+    std::vector<std::vector<float>> columns(dimensions, std::vector<float>(kCount));
+    for (auto& column : columns) {
+      for (float& v : column) v = std::uniform_real_distribution<float>(-3, 3)(engine);
+    }
+    columns[0][17] = 1e6F;  // one stray point must not push all others into one cell
+    std::vector<const float*> starts;
+    for (const auto& column : columns) starts.push_back(column.data());
+    MortonOrder morton;
+    const auto order = morton.sort(starts, kCount);
+    std::vector<std::uint32_t> sorted(order.begin(), order.end());
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<std::uint32_t> all(kCount);
+    std::iota(all.begin(), all.end(), 0U);
+    ASSERT_EQ(sorted, all);
+    const auto length = [&](std::span<const std::uint32_t> path) {
+      double sum = 0;
+      for (std::size_t i = 1; i < path.size(); ++i) {
+        double square = 0;
+        for (const auto& column : columns) square += std::pow(double{column[path[i]]} - double{column[path[i - 1]]}, 2);
+        sum += std::min(std::sqrt(square), 10.0);
+      }
+      return sum;
+    };
+    EXPECT_LT(length(order), (dimensions == 2 ? 0.1 : 0.2) * length(all));
+  }
+}
+
+TEST(BlockBounds, HoldEveryPointWithACap) {
+  for (const int dimension : {2, 3}) {
+    for (unsigned seed = 0; seed < 20; ++seed) {
+      std::mt19937 engine(seed);
+      std::normal_distribution<float> normal;
+      std::vector<std::vector<float>> columns(3, std::vector<float>(kBlockPoints));
+      std::vector<float> caps(kBlockPoints);
+      for (std::size_t i = 0; i < kBlockPoints; ++i) {
+        for (int c = 0; c < dimension; ++c) columns[static_cast<std::size_t>(c)][i] = normal(engine) * (c == 0 ? 1.0F : 0.05F) + 2;
+        columns[1][i] += columns[0][i];
+        caps[i] = i % 3 == 0 ? 0.0F : 0.1F + 0.01F * static_cast<float>(i % 5);
+      }
+      columns[0][0] = 50;  // has no cap, and must not widen the box
+      const float* starts[] = {columns[0].data(), columns[1].data(), columns[2].data()};
+      const BlockBounds bounds = bound_block(starts, caps.data(), dimension);
+      EXPECT_EQ(bounds.count, static_cast<float>(kBlockPoints - (kBlockPoints + 2) / 3));
+      EXPECT_FLOAT_EQ(bounds.least_cap, 0.1F);
+      EXPECT_FLOAT_EQ(bounds.most_cap, 0.14F);
+      double shortest = 1e9, longest = 0;
+      for (int e = 0; e < dimension; ++e) {
+        double square = 0;
+        for (int c = 0; c < dimension; ++c) square += double{bounds.axis[e][c]} * double{bounds.axis[e][c]};
+        shortest = std::min(shortest, std::sqrt(square));
+        longest = std::max(longest, std::sqrt(square));
+        for (std::size_t i = 0; i < kBlockPoints; ++i) {
+          if (caps[i] == 0) continue;
+          double along = 0;
+          for (int c = 0; c < dimension; ++c) along += double{bounds.axis[e][c]} * (double{columns[static_cast<std::size_t>(c)][i]} - double{bounds.mean[c]});
+          EXPECT_LE(std::abs(along), square * (1 + 1e-5));
+        }
+      }
+      EXPECT_LT(longest, 10);
+      EXPECT_LT(shortest, 0.25 * longest);  // the box follows the slanted points
+    }
+  }
+}
+
+TEST(BlockBounds, WithoutCapsThereIsNothingToReach) {
+  const std::vector<float> zeros(kBlockPoints, 0.0F);
+  const float* starts[] = {zeros.data(), zeros.data(), zeros.data()};
+  const BlockBounds bounds = bound_block(starts, zeros.data(), 3);
+  EXPECT_EQ(bounds.count, 0);
+  EXPECT_LT(bounds.most_cap, 0);
+  EXPECT_EQ(bounds.cap_sum, 0);
+}
+
+}  // namespace
+}  // namespace swarmfit::kernels
