@@ -1,8 +1,10 @@
 // Results as files: result.json, label files, images to look at. Each file appears whole or not at all.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/error.hpp>
@@ -15,6 +17,10 @@ namespace swarmfit {
 /// result.json, schema 1. `load_ms`: time spent reading the input.
 SWARMFIT_API std::string to_json(const FitResult& result, const Cloud& input, double load_ms);
 SWARMFIT_API std::string to_json(const PerceiveResult& result, const Cloud& input);
+
+/// Could `file` be written, could `folder` be made and written to? To ask before the work is done; leaves nothing behind.
+SWARMFIT_API Expected<> check_writable(const std::filesystem::path& file);
+SWARMFIT_API Expected<> check_writable_folder(const std::filesystem::path& folder);
 
 /// Writes through a temporary file beside `file` and a rename. Fails with cannot_write, leaving nothing behind.
 SWARMFIT_API Expected<> write_text(const std::filesystem::path& file, const std::string& text);

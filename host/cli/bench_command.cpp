@@ -1,0 +1,166 @@
+// swarmfit bench
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include <swarmfit/bench.hpp>
+#include <swarmfit/cloud.hpp>
+#include <swarmfit/results.hpp>
+
+#include "host/cli/commands.hpp"
+#include "host/cli/console.hpp"
+#include "host/cli/options.hpp"
+#include "host/cli/report.hpp"
+
+namespace swarmfit::cli {
+namespace {
+
+struct BenchArguments {
+  std::string points, particles, backend, model, pruning = "off", json, threads = "0", seconds = "0.3", seed = "1";
+  bool quiet = false;
+};
+
+struct BenchPlan {
+  BenchOptions options;
+  std::string file;  ///< --points names a file
+};
+
+tl::unexpected<Error> invalid(std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); }
+
+Expected<std::vector<std::size_t>> counts(const std::string& option, const std::string& text) {
+  const auto values = parse_list(option, text, "N,N", 0);
+  if (!values) return tl::unexpected(values.error());
+  std::vector<std::size_t> out;
+  for (const double value : *values) {
+    if (!(value >= 1 && value <= 1e9) || value != static_cast<double>(static_cast<std::size_t>(value))) {
+      return invalid(fmt::format("{}: {}, must be whole numbers in 1..1000000000", option, text));
+    }
+    out.push_back(static_cast<std::size_t>(value));
+  }
+  return out;
+}
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> out;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', start), text.size());
+    if (comma > start) out.push_back(text.substr(start, comma - start));
+    start = comma + 1;
+  }
+  return out;
+}
+
+Expected<BenchPlan> plan(const BenchArguments& arguments) {
+  BenchPlan plan;
+  BenchOptions& options = plan.options;
+  if (!arguments.points.empty()) {
+    if (arguments.points.find_first_not_of("0123456789,.e+-") == std::string::npos) {
+      auto points = counts("--points", arguments.points);
+      if (!points) return tl::unexpected(points.error());
+      options.points = std::move(*points);
+    } else {
+      plan.file = arguments.points;
+    }
+  }
+  if (!arguments.particles.empty()) {
+    auto particles = counts("--particles", arguments.particles);
+    if (!particles) return tl::unexpected(particles.error());
+    options.particles = std::move(*particles);
+  }
+  options.backends = split(arguments.backend);
+  for (const auto& name : split(arguments.model)) {
+    const auto type = model_type(name);
+    if (!type) return tl::unexpected(type.error());
+    options.models.push_back(*type);
+  }
+  if (arguments.pruning == "off") {
+    options.pruning = {false};
+  } else if (arguments.pruning == "on") {
+    options.pruning = {true};
+  } else if (arguments.pruning == "both") {
+    options.pruning = {false, true};
+  } else {
+    return invalid(fmt::format("--pruning: {}, must be off, on or both", arguments.pruning));
+  }
+  const auto threads = parse_number(arguments.threads), seconds = parse_number(arguments.seconds), seed = parse_number(arguments.seed);
+  if (!threads || !(*threads >= 0 && *threads <= 4096) || *threads != static_cast<int>(*threads)) {
+    return invalid(fmt::format("--threads: {}, must be a whole number in 0..4096", arguments.threads));
+  }
+  if (!seconds || !(*seconds > 0 && *seconds <= 3600))
+    return invalid(fmt::format("--seconds: {}, must be in (0, 3600]", arguments.seconds));
+  if (!seed || !(*seed >= 0 && *seed < 1.8e19)) return invalid(fmt::format("--seed: {}, must be a whole number >= 0", arguments.seed));
+  options.threads = static_cast<int>(*threads);
+  options.seconds = *seconds;
+  options.seed = static_cast<std::uint64_t>(*seed);
+  return plan;
+}
+
+std::string report_table(const BenchReport& report) {
+  std::vector<std::vector<std::string>> rows = {
+      {"back end", "device", "model", "points", "particles", "pruning", "Geval/s", "of FMA limit", "ms a swarm", "max rel. error"}};
+  for (const BenchRow& row : report.rows) {
+    rows.push_back({row.backend, row.device, row.model, std::to_string(row.points), std::to_string(row.particles),
+                    row.pruning ? "on" : "off", fmt::format("{:.2f}", row.evaluations_per_s * 1e-9),
+                    fmt::format("{:.0f} %", 100 * row.fraction_of_limit), fmt::format("{:.3f}", row.seconds * 1e3),
+                    fmt::format("{:.1e}", row.max_relative_error)});
+  }
+  return table(rows) + fmt::format("the CPU reached {:.1f} G fused multiply-adds a second in this run, {} thread{}\n",
+                                   report.fma_per_s * 1e-9, report.threads, report.threads == 1 ? "" : "s");
+}
+
+int run(const BenchArguments& arguments) {
+  const auto checked = plan(arguments);
+  if (!checked) return complain(checked.error());
+  if (!arguments.json.empty()) {
+    if (auto ok = check_writable(arguments.json); !ok) return complain(ok.error());
+  }
+  std::optional<Cloud> cloud;
+  PointsView view;
+  if (!checked->file.empty()) {
+    auto read = read_cloud(checked->file);
+    if (!read) return complain(read.error());
+    cloud = std::move(*read);
+    view = cloud->points();
+  }
+  Expected<BenchReport> report;
+  {
+    Progress progress(arguments.quiet);
+    report = bench(checked->options, cloud ? &view : nullptr, [&](const std::string& row) { progress.say(row); });
+  }
+  if (!report) return complain(report.error());
+  if (!arguments.json.empty()) {
+    if (auto ok = write_text(arguments.json, to_json(*report)); !ok) return complain(ok.error());
+  }
+  if (!arguments.quiet) fmt::print("{}", report_table(*report));
+  return kDone;
+}
+
+}  // namespace
+
+Command add_bench(CLI::App& app) {
+  auto a = std::make_shared<BenchArguments>();
+  CLI::App* sub = app.add_subcommand("bench", "Fitness throughput of each back end, against the machine's limit");
+  sub->add_option("--points", a->points, "Sizes of the cloud, or a file to take the points from [10000,100000,307200]")
+      ->type_name("N,N|FILE");
+  sub->add_option("--particles", a->particles, "Sizes of the swarm [64,256]")->type_name("N,N");
+  sub->add_option("--backend", a->backend, "Back ends, parted by commas [every usable one]")->type_name("NAME,NAME");
+  sub->add_option("--model", a->model, "Kinds of model, parted by commas [all]")->type_name("MODEL,MODEL");
+  sub->add_option("--pruning", a->pruning, "off: brute force; on: lossless pruning, in effective evaluations")
+      ->type_name("off|on|both")
+      ->capture_default_str();
+  sub->add_option("--threads", a->threads, "Threads of the CPU back end; 0: all")->type_name("N")->capture_default_str();
+  sub->add_option("--seconds", a->seconds, "Least time a row is run for")->type_name("S")->capture_default_str();
+  sub->add_option("--seed", a->seed, "Of the made-up points and particles")->type_name("N")->capture_default_str();
+  sub->add_option("--json", a->json, "The rows as JSON")->type_name("FILE");
+  sub->add_flag("--quiet", a->quiet, "No table, no progress");
+  sub->footer(
+      "Each row's costs are checked against the reference back end before it is timed.\n"
+      "An evaluation is one particle's residual at one point.\n\nexamples:\n  swarmfit bench\n  swarmfit bench --backend cpu --points "
+      "1000000 --particles 1024 --seconds 2");
+  return {sub, [a] { return run(*a); }};
+}
+
+}  // namespace swarmfit::cli

@@ -1,0 +1,157 @@
+// swarmfit fit MODEL INPUT
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <numbers>
+#include <string>
+
+#include <fmt/format.h>
+
+#include <swarmfit/fit.hpp>
+#include <swarmfit/results.hpp>
+
+#include "host/cli/commands.hpp"
+#include "host/cli/console.hpp"
+#include "host/cli/options.hpp"
+#include "host/cli/report.hpp"
+
+namespace swarmfit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct FitArguments {
+  std::string model, input, normal, within;
+  FitFlags fit;
+  OutputFlags output;
+  CameraFlags camera;
+};
+
+bool is_png(const std::string& file) {
+  const std::string extension = fs::path(file).extension().string();
+  return extension == ".png" || extension == ".PNG";
+}
+
+/// --normal and --within: models within an angle of a direction.
+Expected<> apply_prior(const FitArguments& arguments, FitOptions& options) {
+  const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
+  if (arguments.normal.empty() && arguments.within.empty()) return {};
+  if (arguments.normal.empty()) return invalid("--within needs --normal, the direction it is measured from");
+  const std::size_t columns = options.model == ModelType::line2d ? 2 : 3;
+  const auto normal = parse_list("--normal", arguments.normal, columns == 2 ? "X,Y" : "X,Y,Z", columns);
+  if (!normal) return tl::unexpected(normal.error());
+  DirectionPrior prior;
+  prior.axis = Eigen::Vector3d((*normal)[0], (*normal)[1], columns == 2 ? 0 : (*normal)[2]);
+  if (!(prior.axis.norm() > 0)) return invalid(fmt::format("--normal: {}, must not be zero", arguments.normal));
+  if (!arguments.within.empty()) {
+    const auto degrees = parse_number(arguments.within);
+    if (!degrees || !(*degrees > 0 && *degrees <= 90))
+      return invalid(fmt::format("--within: {}, must be in (0, 90] degrees", arguments.within));
+    prior.max_angle = *degrees * std::numbers::pi / 180;
+  }
+  options.prior = prior;
+  return {};
+}
+
+Expected<FitOptions> fit_options(const FitArguments& arguments) {
+  FitOptions options;
+  const auto model = model_type(arguments.model);
+  if (!model) return tl::unexpected(model.error());
+  options.model = *model;
+  if (auto ok = apply_prior(arguments, options); !ok) return tl::unexpected(ok.error());
+  if (auto ok = arguments.fit.apply(options); !ok) return tl::unexpected(ok.error());
+  if (is_png(arguments.input)) {
+    if (auto camera = arguments.camera.camera(); !camera) return tl::unexpected(camera.error());
+    if (auto scale = arguments.camera.scale(); !scale) return tl::unexpected(scale.error());
+  }
+  return options;
+}
+
+Expected<Cloud> read_input(const FitArguments& arguments) {
+  if (is_png(arguments.input)) return read_depth(arguments.input, *arguments.camera.camera(), *arguments.camera.scale());
+  return read_cloud(arguments.input);
+}
+
+Expected<> write(const FitArguments& arguments, const FitResult& result, const Cloud& input, double load_ms) {
+  const auto& output = arguments.output;
+  const std::string json = to_json(result, input, load_ms);
+  if (!output.json.empty()) {
+    if (auto ok = write_text(output.json, json); !ok) return ok;
+  }
+  if (!output.labels.empty()) {
+    if (auto ok = write_labels(output.labels, result.labels); !ok) return ok;
+  }
+  if (output.out.empty()) return {};
+  std::error_code error;
+  fs::create_directories(output.out, error);  // what is wrong with it shows below
+  if (auto ok = write_text(fs::path(output.out) / "result.json", json); !ok) return ok;
+  return write_labels(fs::path(output.out) / "labels.txt", result.labels);
+}
+
+int run(const FitArguments& arguments) {
+  const auto options = fit_options(arguments);
+  if (!options) return complain(options.error());
+  if (auto ok = arguments.output.check(); !ok) return complain(ok.error());
+
+  const Interrupt interrupt;
+  FitResult result;
+  Cloud input;
+  double load_ms = 0;
+  {
+    Progress progress(arguments.output.quiet);
+    progress.say("making the back end ready");
+    auto fitter = Fitter::create(*options);
+    if (!fitter) return complain(fitter.error());
+
+    progress.say("reading " + arguments.input);
+    const Stopwatch loading;
+    auto cloud = read_input(arguments);
+    if (!cloud) return complain(cloud.error());
+    input = std::move(*cloud);
+    load_ms = loading.ms();
+
+    progress.say("fitting");
+    std::size_t found = 0;
+    const auto on_model = [&](const Model&) {
+      progress.say(fmt::format("fitting, {} found so far", ++found));
+      return Verdict::go_on;
+    };
+    auto fitted = fitter->fit(input.points(), on_model, interrupt.token());
+    if (!fitted) return complain(fitted.error());
+    result = std::move(*fitted);
+  }
+  if (auto ok = write(arguments, result, input, load_ms); !ok) return complain(ok.error());
+  if (!arguments.output.quiet) fmt::print("{}", summary(result, input, load_ms));
+  return kDone;
+}
+
+}  // namespace
+
+Command add_fit(CLI::App& app) {
+  auto arguments = std::make_shared<FitArguments>();
+  CLI::App* sub = app.add_subcommand("fit", "Find all models of one kind");
+  std::string models;
+  for (const ModelType type : model_types()) models += (models.empty() ? "" : ", ") + std::string(name(type));
+  sub->add_option("model", arguments->model, "What to find: " + models)->type_name("MODEL")->required();
+  sub->add_option(
+         "input", arguments->input,
+         ".pcd .ply .xyz .csv (x,y or x,y,z or x1,y1,x2,y2; a header is optional, a column named label is ignored), or a 16-bit depth .png")
+      ->type_name("INPUT")
+      ->required();
+  sub->add_option("--normal", arguments->normal, "Only models whose normal is near this direction (line2d: X,Y)")
+      ->type_name("X,Y,Z")
+      ->group("How models are found");
+  sub->add_option("--within", arguments->within, "How near: within this angle [11.5]")->type_name("DEG")->group("How models are found");
+  arguments->fit.add_to(*sub);
+  arguments->camera.add_to(*sub);
+  arguments->output.add_to(*sub, "A folder for result.json and labels.txt");
+  sub->footer(
+      "examples:\n"
+      "  swarmfit fit plane scan.ply --threshold 0.02 --labels labels.txt\n"
+      "  swarmfit fit plane cloud.pcd --normal 0,0,1 --within 10 --json result.json\n"
+      "  swarmfit fit line2d points.csv --threshold auto\n"
+      "  swarmfit fit plane depth.png --intrinsics 525,525,319.5,239.5 --depth-scale 0.001");
+  return {sub, [arguments] { return run(*arguments); }};
+}
+
+}  // namespace swarmfit::cli

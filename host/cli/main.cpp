@@ -1,0 +1,70 @@
+// The command `swarmfit`: parses, dispatches, and turns whatever goes wrong into one line and an exit code.
+#include <exception>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <swarmfit/version.hpp>
+
+#include "host/cli/commands.hpp"
+#include "host/cli/console.hpp"
+
+namespace swarmfit::cli {
+namespace {
+
+constexpr const char* kFooter = R"(A first run:
+  swarmfit demo                              the built-in scene; then look at swarmfit-demo/overlay.png
+  swarmfit perceive table.pcd --out result   planes, objects and their outlines in a depth camera's frame
+  swarmfit fit plane scan.ply --json r.json  every plane of a cloud
+  swarmfit SUBCOMMAND --help                 all options, more examples
+
+Units: metres for 3D input, the data's own unit for 2D; angles in degrees, times in milliseconds.
+Exit codes: 0 done, 2 wrong usage, 3 input cannot be used or output not written, 4 back end cannot be used.
+An error is one line on stderr.)";
+
+/// What CLI11 has to say, in our form.
+std::string usage_error(const CLI::App& app, const CLI::ParseError& error, int argc, const char* const* argv) {
+  const auto subcommands = app.get_subcommands();
+  if (subcommands.empty()) {
+    const std::string first = argc > 1 ? argv[1] : "";
+    if (first.empty()) return "no subcommand; must be one of fit, perceive, bench, devices, demo (swarmfit --help tells more)";
+    return fmt::format("{}: not known; must be one of fit, perceive, bench, devices, demo (swarmfit --help tells more)", first);
+  }
+  return fmt::format("{} (swarmfit {} --help tells more)", error.what(), subcommands.front()->get_name());
+}
+
+int run(int argc, const char* const* argv) {
+  CLI::App app("Swarmfit: all models of a kind in data full of outliers, by particle swarm; and a robot's eye on top of it.", "swarmfit");
+  app.set_version_flag("--version",
+                       fmt::format("swarmfit {}.{}.{}", SWARMFIT_VERSION_MAJOR, SWARMFIT_VERSION_MINOR, SWARMFIT_VERSION_PATCH));
+  app.require_subcommand(1);
+  app.footer(kFooter);
+  app.get_formatter()->column_width(32);
+  const std::vector<Command> commands = {add_fit(app), add_perceive(app), add_bench(app), add_devices(app), add_demo(app)};
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& asked) {
+    return app.exit(asked);  // --help, --version
+  } catch (const CLI::ParseError& error) {
+    return wrong_usage(usage_error(app, error, argc, argv));
+  }
+  for (const Command& command : commands) {
+    if (command.app->parsed()) return command.run();
+  }
+  return kWrongUsage;
+}
+
+}  // namespace
+}  // namespace swarmfit::cli
+
+int main(int argc, char** argv) {
+  try {
+    return swarmfit::cli::run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    return swarmfit::cli::complain({swarmfit::Error::Kind::out_of_memory, "out of memory"});
+  } catch (const std::exception& e) {
+    return swarmfit::cli::complain({swarmfit::Error::Kind::bad_input, e.what()});
+  }
+}

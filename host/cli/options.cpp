@@ -1,0 +1,206 @@
+#include "host/cli/options.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include <swarmfit/results.hpp>
+
+#include "host/cli/console.hpp"
+
+namespace swarmfit::cli {
+namespace {
+
+tl::unexpected<Error> invalid(std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); }
+
+/// A whole number within bounds, into `value`; empty text leaves it as it is.
+template <class Value, class Whole>
+Expected<> whole(const std::string& option, const std::string& text, Whole least, Whole most, Value& value) {
+  if (text.empty()) return {};
+  Whole number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || number < least || number > most) {
+    return invalid(fmt::format("{}: {}, must be a whole number in {}..{}", option, text, least, most));
+  }
+  value = number;
+  return {};
+}
+
+/// A finite number above zero, into `value`; empty text leaves it as it is.
+template <class Value>
+Expected<> positive(const std::string& option, const std::string& text, const std::string& unit, Value& value) {
+  if (text.empty()) return {};
+  const auto number = parse_number(text);
+  if (!number || !(*number > 0) || !std::isfinite(*number))
+    return invalid(fmt::format("{}: {}, must be a number > 0{}", option, text, unit));
+  value = *number;
+  return {};
+}
+
+}  // namespace
+
+std::optional<double> parse_number(const std::string& text) {
+  double value = 0;
+  const char* first = text.data() + (text.size() > 1 && text[0] == '+' ? 1 : 0);
+  const auto [end, error] = std::from_chars(first, text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || text.empty()) return std::nullopt;
+  return value;
+}
+
+Expected<std::vector<double>> parse_list(const std::string& option, const std::string& text, const std::string& form, std::size_t count) {
+  std::vector<double> values;
+  for (std::size_t start = 0; start <= text.size();) {
+    const std::size_t comma = std::min(text.find(',', start), text.size());
+    const auto value = parse_number(text.substr(start, comma - start));
+    if (!value || !std::isfinite(*value)) return invalid(fmt::format("{}: {}, must be numbers of the form {}", option, text, form));
+    values.push_back(*value);
+    start = comma + 1;
+  }
+  if (count != 0 && values.size() != count)
+    return invalid(fmt::format("{}: {} has {} numbers, must have {}, {}", option, text, values.size(), count, form));
+  return values;
+}
+
+void FitFlags::add_to(CLI::App& app) {
+  const char* group = "How models are found";
+  app.add_option("--threshold", threshold,
+                 "Inliers are within this distance, in the data's unit; auto: from the data's own noise [plane: 0.01, else auto]")
+      ->type_name("VALUE|auto")
+      ->group(group);
+  app.add_option("--backend", backend, "auto, cpu, vulkan, reference, or part of a device's name; see swarmfit devices")
+      ->type_name("NAME")
+      ->group(group)
+      ->capture_default_str();
+  app.add_option("--threads", threads, "Threads of the CPU back end; 0: all")->type_name("N")->group(group)->capture_default_str();
+  app.add_option("--seed", seed, "The same seed gives the same result")->type_name("N")->group(group)->capture_default_str();
+  app.add_option("--preset", preset, "fast: what measures best; paper: Zhou et al. 2010 to the letter")
+      ->type_name("fast|paper")
+      ->group(group)
+      ->capture_default_str();
+  app.add_option("--particles", particles, "Size of the swarm, >= 2")->type_name("N")->group(group);
+  app.add_option("--iterations", iterations, "Most steps of one swarm")->type_name("N")->group(group);
+  app.add_option("--stall", stall, "Converged when the best has not moved for this many steps")->type_name("N")->group(group);
+  app.add_option("--deflation", deflation, "How found models are left behind: by what they explain, or by their parameters")
+      ->type_name("residual|parametric")
+      ->group(group);
+  app.add_option("--lambda", lambda, "Strength of parametric deflation, > 0")->type_name("VALUE")->group(group);
+  app.add_option("--min-inliers", min_inliers, "A model has at least this many [from the data]")->type_name("N")->group(group);
+  app.add_option("--max-models", max_models, "Stop after this many [no bound]")->type_name("N")->group(group);
+  app.add_option("--time-budget", time_budget, "Stop after this time; what is found by then is valid [none]")
+      ->type_name("MS")
+      ->group(group);
+}
+
+Expected<> FitFlags::apply(FitOptions& options) const {
+  if (threshold == "auto") {
+    options.estimate_threshold = true;
+  } else if (!threshold.empty() && !parse_number(threshold)) {
+    return invalid(fmt::format("--threshold: {}, must be a number > 0 or auto", threshold));
+  } else if (auto ok = positive("--threshold", threshold, " in the data's unit", options.threshold); !ok) {
+    return ok;
+  }
+  if (preset != "fast" && preset != "paper") return invalid(fmt::format("--preset: {}, must be fast or paper", preset));
+  options.preset = preset == "fast" ? Preset::fast : Preset::paper;
+  if (!deflation.empty() && deflation != "residual" && deflation != "parametric") {
+    return invalid(fmt::format("--deflation: {}, must be residual or parametric", deflation));
+  }
+  if (!deflation.empty()) options.deflation = deflation == "residual" ? Deflation::residual : Deflation::parametric;
+  if (backend.empty()) return invalid("--backend: empty, must be auto, cpu, vulkan, reference, or part of a device's name");
+  options.backend = backend;
+  options.pipeline_cache = pipeline_cache_folder();
+
+  constexpr int kMost = 1'000'000'000;
+  constexpr std::size_t kMany = std::size_t{1} << 32;
+  Expected<> checks[] = {
+      whole("--particles", particles, 2, 1'000'000, options.particles),
+      whole("--iterations", iterations, 1, kMost, options.iterations),
+      whole("--stall", stall, 1, kMost, options.stall),
+      whole("--threads", threads, 0, 4096, options.threads),
+      whole("--seed", seed, std::uint64_t{0}, std::numeric_limits<std::uint64_t>::max(), options.seed),
+      whole("--min-inliers", min_inliers, std::size_t{1}, kMany, options.min_inliers),
+      whole("--max-models", max_models, std::size_t{1}, std::size_t{65534}, options.max_models),
+      positive("--lambda", lambda, "", options.lambda),
+      positive("--time-budget", time_budget, " [ms]", options.time_budget_ms),
+  };
+  for (auto& check : checks) {
+    if (!check) return check;
+  }
+  return options.validate();
+}
+
+void OutputFlags::add_to(CLI::App& app, const std::string& out_help) {
+  const char* group = "Where results go";
+  app.add_option("--json", json, "The result as JSON: models, their parameters and covariance, times")->type_name("FILE")->group(group);
+  app.add_option("--labels", labels, "Text, a whole number a line, a line a point: 0 none, k the k-th model")
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--out", out, out_help)->type_name("DIR")->group(group);
+  app.add_flag("--quiet", quiet, "No summary, no progress")->group(group);
+}
+
+Expected<> OutputFlags::check() const {
+  for (const auto& file : {json, labels}) {
+    if (file.empty()) continue;
+    if (auto ok = check_writable(file); !ok) return ok;
+  }
+  if (!out.empty()) return check_writable_folder(out);
+  return {};
+}
+
+void SceneFlags::add_to(CLI::App& app) {
+  const char* group = "What is known of the scene";
+  app.add_option("--gravity", gravity, "Direction of gravity in the camera's frame (x right, y down, z forward)")
+      ->type_name("X,Y,Z")
+      ->group(group);
+  app.add_option("--camera-tilt", camera_tilt, "The camera looks down by this much; with neither, the dominant plane is the ground")
+      ->type_name("DEG")
+      ->group(group);
+  app.add_option("--gallery", gallery, "Names for what is found: one image, or one folder of images, a name")
+      ->type_name("DIR")
+      ->group(group);
+}
+
+Expected<> SceneFlags::apply(PerceiveOptions& options) const {
+  if (!gravity.empty() && !camera_tilt.empty()) return invalid("--gravity and --camera-tilt exclude each other");
+  if (!gravity.empty()) {
+    const auto g = parse_list("--gravity", gravity, "X,Y,Z", 3);
+    if (!g) return tl::unexpected(g.error());
+    options.gravity = Eigen::Vector3d((*g)[0], (*g)[1], (*g)[2]);
+    if (!(options.gravity->norm() > 0)) return invalid(fmt::format("--gravity: {}, must not be zero", gravity));
+  }
+  if (!camera_tilt.empty()) {
+    const auto tilt = parse_number(camera_tilt);
+    if (!tilt || !(std::abs(*tilt) <= 90)) return invalid(fmt::format("--camera-tilt: {}, must be in -90..90 [degrees]", camera_tilt));
+    options.camera_tilt = *tilt * std::numbers::pi / 180;
+  }
+  options.gallery = gallery;
+  return options.validate();
+}
+
+void CameraFlags::add_to(CLI::App& app) {
+  const char* group = "The camera of a depth image";
+  app.add_option("--intrinsics", intrinsics, "Focal lengths and principal point [px]")->type_name("FX,FY,CX,CY")->group(group);
+  app.add_option("--depth-scale", depth_scale, "Metres a unit of depth")->type_name("S")->group(group)->capture_default_str();
+}
+
+Expected<Intrinsics> CameraFlags::camera() const {
+  if (intrinsics.empty()) return invalid("--intrinsics FX,FY,CX,CY is needed with a depth image");
+  const auto k = parse_list("--intrinsics", intrinsics, "FX,FY,CX,CY", 4);
+  if (!k) return tl::unexpected(k.error());
+  if (!((*k)[0] > 0 && (*k)[1] > 0)) return invalid(fmt::format("--intrinsics: {}, focal lengths must be > 0 [px]", intrinsics));
+  return Intrinsics{(*k)[0], (*k)[1], (*k)[2], (*k)[3]};
+}
+
+Expected<double> CameraFlags::scale() const {
+  double scale = 0;
+  if (depth_scale.empty()) return invalid("--depth-scale: empty, must be a number > 0 [m a unit]");
+  if (auto ok = positive("--depth-scale", depth_scale, " [m a unit]", scale); !ok) return tl::unexpected(ok.error());
+  return scale;
+}
+
+}  // namespace swarmfit::cli

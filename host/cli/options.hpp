@@ -1,0 +1,62 @@
+// Options that several subcommands share, and how their text becomes the library's.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include <swarmfit/cloud.hpp>
+#include <swarmfit/fit.hpp>
+#include <swarmfit/perception.hpp>
+
+namespace swarmfit::cli {
+
+/// A number, or nothing where the text is not one. NaN and infinity are numbers here; whoever reads them says what is allowed.
+std::optional<double> parse_number(const std::string& text);
+/// `count` numbers parted by commas. Fails with invalid_option, naming the option and the form it has.
+Expected<std::vector<double>> parse_list(const std::string& option, const std::string& text, const std::string& form, std::size_t count);
+/// An option that is given must be above zero.
+Expected<> must_be_positive(const std::string& option, const std::optional<double>& value, const std::string& unit);
+
+/// How models are found: given to fit, perceive and demo.
+struct FitFlags {
+  std::string threshold, preset = "fast", deflation, backend = "auto", particles, iterations, stall, lambda, min_inliers, max_models,
+                         time_budget, threads = "0", seed = "1";
+
+  void add_to(CLI::App& app);
+  /// Into `options`; what is not given keeps its value. Fails with invalid_option.
+  Expected<> apply(FitOptions& options) const;
+};
+
+/// Where results go.
+struct OutputFlags {
+  std::string json, labels, out;
+  bool quiet = false;
+
+  void add_to(CLI::App& app, const std::string& out_help);
+  /// Fails with cannot_write, before any work is done.
+  Expected<> check() const;
+};
+
+/// Which way is up, and what is known by name: given to perceive and demo.
+struct SceneFlags {
+  std::string gravity, camera_tilt, gallery;
+
+  void add_to(CLI::App& app);
+  Expected<> apply(PerceiveOptions& options) const;
+};
+
+/// The pinhole camera behind a depth image.
+struct CameraFlags {
+  std::string intrinsics, depth_scale = "0.001";
+
+  void add_to(CLI::App& app);
+  /// Fails with invalid_option: not given, not four numbers, out of bounds.
+  Expected<Intrinsics> camera() const;
+  Expected<double> scale() const;
+};
+
+}  // namespace swarmfit::cli

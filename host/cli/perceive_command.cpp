@@ -1,0 +1,141 @@
+// swarmfit perceive INPUT
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include <swarmfit/perception.hpp>
+#include <swarmfit/results.hpp>
+
+#include "host/cli/commands.hpp"
+#include "host/cli/console.hpp"
+#include "host/cli/perceive.hpp"
+#include "host/cli/report.hpp"
+
+namespace swarmfit::cli {
+namespace {
+
+struct PerceiveArguments {
+  std::string input, color, depth, left, right, calib;
+  FitFlags fit;
+  SceneFlags scene;
+  CameraFlags camera;
+  OutputFlags output;
+};
+
+Expected<> write(const OutputFlags& output, const PerceiveResult& result, const Cloud& input) {
+  if (!output.json.empty()) {
+    if (auto ok = write_text(output.json, to_json(result, input)); !ok) return ok;
+  }
+  if (!output.labels.empty()) {
+    if (auto ok = write_labels(output.labels, result.fit.labels); !ok) return ok;
+  }
+  return output.out.empty() ? Expected<>() : write_perception(output.out, result, input);
+}
+
+/// Which of the three kinds of input was given; the reader for it.
+Expected<std::function<Expected<Cloud>()>> reader(const PerceiveArguments& a) {
+  const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
+  const bool rgbd = !a.color.empty() || !a.depth.empty();
+  const bool stereo = !a.left.empty() || !a.right.empty() || !a.calib.empty();
+  if (int{!a.input.empty()} + int{rgbd} + int{stereo} != 1) {
+    return invalid("perceive takes one of: INPUT, or --color and --depth with --intrinsics, or --left, --right and --calib");
+  }
+  if (!a.input.empty()) return [file = a.input] { return read_cloud(file); };
+  if (stereo) {
+    for (const auto& [value, option] : {std::pair{&a.left, "--left"}, std::pair{&a.right, "--right"}, std::pair{&a.calib, "--calib"}}) {
+      if (value->empty()) return invalid(fmt::format("{} FILE is missing: a stereo pair needs --left, --right and --calib", option));
+    }
+    return [left = a.left, right = a.right, calib = a.calib] { return read_stereo(left, right, calib); };
+  }
+  if (a.depth.empty()) return invalid("--depth FILE is missing: --color needs the depth image that goes with it");
+  const auto camera = a.camera.camera();
+  if (!camera) return tl::unexpected(camera.error());
+  const auto scale = a.camera.scale();
+  if (!scale) return tl::unexpected(scale.error());
+  if (a.color.empty()) return [depth = a.depth, k = *camera, s = *scale] { return read_depth(depth, k, s); };
+  return [color = a.color, depth = a.depth, k = *camera, s = *scale] { return read_rgbd(color, depth, k, s); };
+}
+
+int run(const PerceiveArguments& arguments) {
+  PerceiveJob job;
+  if (auto ok = arguments.fit.apply(job.options.fit); !ok) return complain(ok.error());
+  if (auto ok = arguments.scene.apply(job.options); !ok) return complain(ok.error());
+  auto read = reader(arguments);
+  if (!read) return complain(read.error());
+  job.read = std::move(*read);
+  job.input = !arguments.input.empty() ? arguments.input : !arguments.depth.empty() ? arguments.depth : arguments.left;
+  job.output = arguments.output;
+  return run_perceive(job);
+}
+
+}  // namespace
+
+int run_perceive(const PerceiveJob& job) {
+  if (auto ok = job.output.check(); !ok) return complain(ok.error());
+  const Interrupt interrupt;
+  PerceiveResult result;
+  Cloud input;
+  {
+    Progress progress(job.output.quiet);
+    progress.say("making the back end ready");
+    auto perceiver = Perceiver::create(job.options);
+    if (!perceiver) return complain(perceiver.error());
+
+    progress.say("reading " + job.input);
+    const Stopwatch loading;
+    auto cloud = job.read();
+    if (!cloud) return complain(cloud.error());
+    input = std::move(*cloud);
+    const double load_ms = loading.ms();
+
+    progress.say("perceiving");
+    std::size_t found = 0;
+    const auto on_plane = [&](const Model&) {
+      progress.say(fmt::format("perceiving, {} planes so far", ++found));
+      return Verdict::go_on;
+    };
+    auto perceived = perceiver->perceive(input, on_plane, interrupt.token());
+    if (!perceived) return complain(perceived.error());
+    result = std::move(*perceived);
+    result.timing_ms.load = load_ms;
+    progress.say("writing");
+    if (auto ok = write(job.output, result, input); !ok) return complain(ok.error());
+  }
+  if (!job.output.quiet) {
+    fmt::print("{}", summary(result, input));
+    if (job.more) fmt::print("{}", job.more(result, input));
+    if (!job.output.out.empty())
+      fmt::print("written to {}: {}\n", job.output.out,
+                 input.organised() ? "result.json, planes.png, popout.png, objects.png, overlay.png" : "result.json, labelled.ply");
+  }
+  return kDone;
+}
+
+Command add_perceive(CLI::App& app) {
+  auto a = std::make_shared<PerceiveArguments>();
+  CLI::App* sub = app.add_subcommand("perceive", "The whole chain: supporting planes, what sticks out of them, its outline, its name");
+  sub->add_option("input", a->input, "A cloud: .pcd .ply .xyz .csv; organised and coloured, outlines are found too")->type_name("INPUT");
+  const char* rgbd = "Instead of INPUT: an RGB-D frame";
+  sub->add_option("--color", a->color, "Colour image, registered to the depth image")->type_name("FILE")->group(rgbd);
+  sub->add_option("--depth", a->depth, "16-bit depth PNG; 0 is a hole")->type_name("FILE")->group(rgbd);
+  a->camera.add_to(*sub);
+  const char* stereo = "Instead of INPUT: a rectified stereo pair";
+  sub->add_option("--left", a->left, "Left image")->type_name("FILE")->group(stereo);
+  sub->add_option("--right", a->right, "Right image")->type_name("FILE")->group(stereo);
+  sub->add_option("--calib", a->calib, "Middlebury's calib.txt: cam0, doffs, baseline [mm], ndisp")->type_name("FILE")->group(stereo);
+  a->scene.add_to(*sub);
+  a->fit.add_to(*sub);
+  a->output.add_to(*sub,
+                   "A folder for result.json, planes.png, popout.png, objects.png and overlay.png to look at; labelled.ply for a cloud "
+                   "with no image grid");
+  sub->footer(
+      "examples:\n"
+      "  swarmfit perceive table.pcd --out result\n"
+      "  swarmfit perceive --color c.png --depth d.png --intrinsics 613,613,322,248 --depth-scale 0.001 --out result\n"
+      "  swarmfit perceive --left im0.png --right im1.png --calib calib.txt --gallery objects --out result");
+  return {sub, [a] { return run(*a); }};
+}
+
+}  // namespace swarmfit::cli

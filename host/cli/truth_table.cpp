@@ -1,0 +1,116 @@
+#include "host/cli/truth_table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "host/cli/report.hpp"
+
+namespace swarmfit::cli {
+namespace {
+
+using Labels = std::span<const std::uint16_t>;
+
+struct Match {
+  std::size_t label = 0;  ///< the found label that covers the true one best; 0: none
+  double iou = 0;         ///< intersection over union, counted where the depth is known
+};
+
+/// Intersection over union of true label `k` with each found one, over pixels that were seen.
+Match best_match(Labels truth, std::size_t k, Labels found, std::size_t found_count, const std::vector<bool>& seen) {
+  std::vector<std::size_t> common(found_count + 1), size(found_count + 1);
+  std::size_t true_size = 0;
+  for (std::size_t i = 0; i < std::min(truth.size(), found.size()); ++i) {
+    if (!seen[i]) continue;
+    const std::size_t f = found[i] <= found_count ? found[i] : 0;
+    ++size[f];
+    if (truth[i] != k) continue;
+    ++true_size;
+    ++common[f];
+  }
+  Match best;
+  for (std::size_t f = 1; f <= found_count; ++f) {
+    const double iou = static_cast<double>(common[f]) / static_cast<double>(std::max<std::size_t>(1, true_size + size[f] - common[f]));
+    if (iou > best.iou) best = {f, iou};
+  }
+  return best;
+}
+
+std::vector<bool> seen_pixels(const Cloud& cloud) {
+  std::vector<bool> seen(cloud.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    seen[i] = std::isfinite(cloud.values64.empty() ? static_cast<double>(cloud.values32[3 * i + 2]) : cloud.values64[3 * i + 2]);
+  }
+  return seen;
+}
+
+/// Mean of the points with a true label.
+Eigen::Vector3d centre_of(const Cloud& cloud, Labels truth, std::size_t k, const std::vector<bool>& seen) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    if (truth[i] != k || !seen[i]) continue;
+    for (std::size_t d = 0; d < 3; ++d) {
+      const std::size_t at = 3 * i + d;
+      sum[static_cast<Eigen::Index>(d)] += cloud.values64.empty() ? static_cast<double>(cloud.values32[at]) : cloud.values64[at];
+    }
+    ++count;
+  }
+  return count ? Eigen::Vector3d(sum / static_cast<double>(count)) : sum;
+}
+
+std::string planes_table(const Scene& scene, const PerceiveResult& result, const std::vector<bool>& seen) {
+  std::vector<std::vector<std::string>> rows = {{"true surface", "normal", "found as", "supports", "angle off", "height off", "overlap"}};
+  for (std::size_t k = 1; k <= scene.truth.planes.size(); ++k) {
+    const Eigen::Vector4d& plane = scene.truth.planes[k - 1];
+    const Eigen::Vector3d normal = plane.head<3>();
+    std::vector<std::string> row = {std::to_string(k), fmt::format("({:7.4f}, {:7.4f}, {:7.4f})", normal.x(), normal.y(), normal.z())};
+    const Match match = best_match(scene.truth.plane_labels, k, result.fit.labels, result.fit.models.size(), seen);
+    if (match.label == 0) {
+      row.insert(row.end(), {"not found", "", "", "", ""});
+    } else {
+      const Model& model = result.fit.models[match.label - 1];
+      const double angle = std::acos(std::min(1.0, std::abs(model.normal().dot(normal)))) * 180 / std::numbers::pi;
+      const double height = std::abs(model.normal().dot(centre_of(scene.cloud, scene.truth.plane_labels, k, seen)) + model.offset());
+      row.insert(row.end(), {fmt::format("plane {}", match.label), model.supporting ? "yes" : "no", fmt::format("{:.2f} deg", angle),
+                             fmt::format("{:.1f} mm", 1000 * height), fmt::format("{:.1f} %", 100 * match.iou)});
+    }
+    rows.push_back(std::move(row));
+  }
+  return table(rows);
+}
+
+std::string objects_table(const Scene& scene, const PerceiveResult& result, const std::vector<bool>& seen) {
+  std::vector<std::vector<std::string>> rows = {{"true object", "kind", "pixels", "found as", "outline's overlap", "name"}};
+  std::size_t found = 0;
+  for (std::size_t k = 1; k <= scene.truth.objects; ++k) {
+    const auto pixels = std::count(scene.truth.object_labels.begin(), scene.truth.object_labels.end(), k);
+    const Match match = best_match(scene.truth.object_labels, k, result.objects, result.sois.size(), seen);
+    found += match.iou > 0.5;
+    const bool has_kind = k <= scene.truth.object_names.size();
+    std::vector<std::string> row = {std::to_string(k), has_kind ? scene.truth.object_names[k - 1] : "", std::to_string(pixels)};
+    if (match.label == 0) {
+      row.insert(row.end(), {"not found", "", ""});
+    } else {
+      const auto& names = result.sois[match.label - 1].recognised;
+      row.insert(row.end(),
+                 {fmt::format("SOI {}", match.label), fmt::format("{:.1f} %", 100 * match.iou), names.empty() ? "" : names.front().name});
+    }
+    rows.push_back(std::move(row));
+  }
+  return table(rows) + fmt::format("{} of {} objects overlap what was found by more than half\n", found, scene.truth.objects);
+}
+
+}  // namespace
+
+std::string truth_table(const Scene& scene, const PerceiveResult& result) {
+  const std::vector<bool> seen = seen_pixels(scene.cloud);
+  return "\nthe scene's truth beside what was found\n" + planes_table(scene, result, seen) + objects_table(scene, result, seen);
+}
+
+}  // namespace swarmfit::cli
