@@ -1,0 +1,89 @@
+// Wrong usage is answered with one line and exit code 2, help and version with 0.
+#include <gtest/gtest.h>
+
+#include "tests/cli_runner.hpp"
+
+namespace {
+
+using swarmfit::tests::expect_refusal;
+using swarmfit::tests::run_swarmfit;
+using swarmfit::tests::TemporaryFolder;
+
+TEST(CliUsage, HelpAndVersion) {
+  const TemporaryFolder folder;
+  const auto help = run_swarmfit(folder, {"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* word : {"fit", "perceive", "bench", "devices", "demo", "Exit codes", "metres"})
+    EXPECT_NE(help.out.find(word), std::string::npos) << word;
+  for (const char* sub : {"fit", "perceive", "bench", "devices", "demo"}) {
+    const auto sub_help = run_swarmfit(folder, {sub, "--help"});
+    EXPECT_EQ(sub_help.code, 0) << sub;
+    EXPECT_EQ(sub_help.err, "") << sub;
+  }
+  const auto fit_help = run_swarmfit(folder, {"fit", "--help"});
+  for (const char* option : {"--threshold", "--backend",   "--threads", "--seed",        "--preset",     "--particles",   "--iterations",
+                             "--stall",     "--deflation", "--lambda",  "--min-inliers", "--max-models", "--time-budget", "--json",
+                             "--labels",    "--out",       "--quiet",   "--normal",      "--within",     "plane",         "line2d"}) {
+    EXPECT_NE(fit_help.out.find(option), std::string::npos) << option;
+  }
+  EXPECT_TRUE(run_swarmfit(folder, {"--version"}).out.starts_with("swarmfit 0."));
+}
+
+TEST(CliUsage, UnknownWords) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+  expect_refusal(folder, {}, 2, "no subcommand");
+  expect_refusal(folder, {"frobnicate"}, 2, "frobnicate");
+  expect_refusal(folder, {"--frobnicate"}, 2, "frobnicate");
+  expect_refusal(folder, {"fit"}, 2, "model");
+  expect_refusal(folder, {"fit", "plane"}, 2, "input");
+  expect_refusal(folder, {"fit", "blob", "c.xyz"}, 2, "blob");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--frobnicate"}, 2, "--frobnicate");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "more"}, 2, "more");
+  expect_refusal(folder, {"devices", "more"}, 2, "more");
+}
+
+TEST(CliUsage, ValuesOutOfTheirBounds) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+  for (const char* option : {"--threshold", "--lambda", "--time-budget"}) {
+    for (const char* value : {"0", "-1", "nan", "inf", "much"}) expect_refusal(folder, {"fit", "plane", "c.xyz", option, value}, 2, option);
+  }
+  for (const char* option : {"--particles", "--iterations", "--stall", "--min-inliers", "--max-models"}) {
+    for (const char* value : {"0", "-1", "nan", "1.5", "99999999999999999999"})
+      expect_refusal(folder, {"fit", "plane", "c.xyz", option, value}, 2, option);
+  }
+  for (const char* value : {"-1", "nan", "x"}) {
+    expect_refusal(folder, {"fit", "plane", "c.xyz", "--threads", value}, 2, "--threads");
+    expect_refusal(folder, {"fit", "plane", "c.xyz", "--seed", value}, 2, "--seed");
+  }
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--preset", "slow"}, 2, "--preset");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--deflation", "none"}, 2, "--deflation");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--normal", "0,0,0"}, 2, "--normal");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--normal", "0,1"}, 2, "--normal");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--within", "10"}, 2, "--normal");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--normal", "0,0,1", "--within", "0"}, 2, "--within");
+  expect_refusal(folder, {"fit", "plane", "d.png"}, 2, "--intrinsics");
+  expect_refusal(folder, {"fit", "plane", "d.png", "--intrinsics", "1,2,3"}, 2, "--intrinsics");
+  expect_refusal(folder, {"fit", "plane", "d.png", "--intrinsics", "0,2,3,4"}, 2, "--intrinsics");
+  expect_refusal(folder, {"fit", "plane", "d.png", "--intrinsics", "1,2,3,4", "--depth-scale", "0"}, 2, "--depth-scale");
+  for (const char* option : {"--points", "--particles", "--seconds", "--threads", "--pruning", "--model"}) {
+    expect_refusal(folder, {"bench", option, "-1"}, 2, option == std::string("--model") ? "-1" : option);
+  }
+}
+
+TEST(CliUsage, PerceiveTakesOneKindOfInput) {
+  const TemporaryFolder folder;
+  expect_refusal(folder, {"perceive"}, 2, "one of");
+  expect_refusal(folder, {"perceive", "c.pcd", "--left", "l.png"}, 2, "one of");
+  expect_refusal(folder, {"perceive", "--left", "l.png", "--right", "r.png"}, 2, "--calib");
+  expect_refusal(folder, {"perceive", "--color", "c.png", "--intrinsics", "1,1,1,1"}, 2, "--depth");
+  expect_refusal(folder, {"perceive", "--color", "c.png", "--depth", "d.png"}, 2, "--intrinsics");
+  expect_refusal(folder, {"perceive", "c.pcd", "--gravity", "0,0,0"}, 2, "--gravity");
+  expect_refusal(folder, {"perceive", "c.pcd", "--gravity", "0,nan,0"}, 2, "--gravity");
+  expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "91"}, 2, "--camera-tilt");
+  expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "nan"}, 2, "--camera-tilt");
+  expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "1", "--gravity", "0,1,0"}, 2, "exclude");
+}
+
+}  // namespace
