@@ -1,13 +1,13 @@
 #include "host/cli/console.hpp"
 
+#include <cerrno>
 #include <condition_variable>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <utility>
 
-#include <pthread.h>
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -24,12 +24,17 @@ std::string on_one_line(std::string_view message) {
   return line;
 }
 
-sigset_t interrupts() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  return set;
+/// A stop source may not be touched in a signal handler, a pipe may: a thread waits at its other end.
+constexpr char kStop = 1;
+volatile std::sig_atomic_t wake_end = -1;
+volatile std::sig_atomic_t asked = 0;
+
+extern "C" void on_interrupt(int) {
+  if (asked) std::_Exit(130);  // asked before: they mean it
+  asked = 1;
+  const int saved = errno;
+  [[maybe_unused]] const auto written = ::write(wake_end, &kStop, 1);
+  errno = saved;
 }
 
 }  // namespace
@@ -85,22 +90,31 @@ void Progress::run(const std::stop_token& stop) {
 }
 
 Interrupt::Interrupt() {
-  const sigset_t set = interrupts();
-  pthread_sigmask(SIG_BLOCK, &set, nullptr);  // inherited by every later thread; only the listener takes them
-  listener_ = std::jthread([this, set](const std::stop_token& stop) {
-    const timespec tick{0, 100'000'000};
-    while (!stop.stop_requested()) {
-      if (sigtimedwait(&set, nullptr, &tick) < 0) continue;
-      if (!work_.request_stop()) std::_Exit(130);  // asked before: they mean it
+  if (::pipe2(wake_, O_CLOEXEC) != 0) return;  // then Ctrl-C ends the program, as it would have
+  wake_end = wake_[1];
+  asked = 0;
+  listener_ = std::jthread([this] {
+    char byte = 0;
+    while (::read(wake_[0], &byte, 1) < 0 && errno == EINTR) {
     }
+    if (byte == kStop) work_.request_stop();
   });
+  struct sigaction action {};
+  action.sa_handler = on_interrupt;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
 }
 
 Interrupt::~Interrupt() {
-  listener_.request_stop();
+  if (!listener_.joinable()) return;
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  const char bye = 0;
+  [[maybe_unused]] const auto written = ::write(wake_[1], &bye, 1);
   listener_.join();
-  const sigset_t set = interrupts();
-  pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
+  ::close(wake_[0]);
+  ::close(wake_[1]);
 }
 
 std::string pipeline_cache_folder() {

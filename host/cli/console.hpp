@@ -45,8 +45,7 @@ class Progress {
   std::jthread ticker_;  // last: it reads the rest
 };
 
-/// While it lives, the first Ctrl-C asks the work to stop and a second ends the program at once. One at a time, made before any
-/// other thread.
+/// While it lives, the first Ctrl-C asks the work to stop and a second ends the program at once. One at a time.
 class Interrupt {
  public:
   Interrupt();
@@ -56,6 +55,7 @@ class Interrupt {
   std::stop_token token() const { return work_.get_token(); }
 
  private:
+  int wake_[2] = {-1, -1};
   std::stop_source work_;
   std::jthread listener_;
 };

@@ -39,8 +39,9 @@ bool same_ignoring_case(std::string_view a, std::string_view b) {
   });
 }
 
-std::string device_name(const CpuKernels& kernels, int threads) {
-  return fmt::format("{}, {} thread{}", kernels.name, threads, threads == 1 ? "" : "s");
+/// Without the number of threads: a result is the same bytes on any.
+std::string device_name(const CpuKernels& kernels) {
+  return fmt::format("CPU, {}", kernels.name);
 }
 
 /// Work that may run out of memory, with the failure as a value.
@@ -57,7 +58,7 @@ Result<> guarded(std::size_t points, Work&& work) {
 class CpuEvaluator final : public FitnessEvaluator {
  public:
   CpuEvaluator(const CpuKernels& kernels, int threads, bool pruning)
-      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels, threads)}, costs_(kernels, pruning) {}
+      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning) {}
 
   const Identity& identity() const noexcept override { return identity_; }
   Support supports(const Workload& workload) const override {
@@ -204,7 +205,7 @@ Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOpti
 
 std::vector<DeviceDescription> cpu_devices() {
   const int threads = tbb::info::default_concurrency();
-  DeviceDescription device{"cpu", device_name(*available_kernels().front(), threads), "cpu", true, "always there", {}};
+  DeviceDescription device{"cpu", device_name(*available_kernels().front()), "cpu", true, "always there", {}};
   device.limits.emplace_back("instruction sets", fmt::format("{}", fmt::join(kernel_names(), ", ")));
   device.limits.emplace_back("threads", fmt::format("{}", threads));
   device.limits.emplace_back("points", fmt::format("{}", std::numeric_limits<std::int32_t>::max()));
