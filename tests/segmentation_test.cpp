@@ -74,7 +74,7 @@ TEST(ColourCost, IsTheMeanDistanceToTheNearestOfTheSample) {
       colours.push_back(to_hls(r, g, b));
     }
     sample.close(1000);
-    EXPECT_EQ(sample.neighbours(), k == 0 ? 7 : k);  // sqrt(50)
+    EXPECT_EQ(sample.neighbours(), k == 0 ? 4 : k);  // sqrt(50) / 2
     for (int i = 0; i < 50; ++i) {
       const std::uint8_t r = random.byte(), g = random.byte(), b = random.byte();
       std::vector<float> distances;
@@ -98,7 +98,7 @@ TEST(ColourCost, AnEmptySampleCostsAllAndALargeOneIsThinned) {
   for (int i = 0; i < 1000; ++i) many.add(static_cast<std::uint8_t>(i % 256), 0, 0);
   many.close(100);
   EXPECT_EQ(many.size(), 100U);
-  EXPECT_EQ(many.neighbours(), 10);
+  EXPECT_EQ(many.neighbours(), 5);
 }
 
 struct Grid {
@@ -268,9 +268,9 @@ TEST(Segmentation, OutlinesTheObjectsAndFillsTheirHoles) {
     const Case c = make_case(seed);
     const Score before = score(c, c.popout);
     const Score after = score(c, segment_objects(c.input(), PerceiveOptions{}));
-    EXPECT_GT(after.f, 0.95) << "seed " << seed;
+    EXPECT_GT(after.f, 0.97) << "seed " << seed;
     EXPECT_GT(after.f, before.f + 0.02) << "seed " << seed << ": better than depth alone";
-    EXPECT_GT(after.holes, 0.8) << "seed " << seed;
+    EXPECT_GT(after.holes, 0.85) << "seed " << seed;
     EXPECT_EQ(before.holes, 0);
   }
 }

@@ -11,7 +11,7 @@ constexpr std::uint16_t kUnknown = 65535;
 
 Hls to_hls(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
   const int high = std::max({red, green, blue}), low = std::min({red, green, blue}), range = high - low, sum = high + low;
-  Hls out;
+  Hls out{0, 0, 0};
   out.l = static_cast<float>(sum) / 510;
   if (range == 0) return out;  // grey has no hue
   out.s = static_cast<float>(range) / static_cast<float>(sum <= 255 ? sum : 510 - sum);
@@ -28,7 +28,7 @@ Hls to_hls(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
 }
 
 int neighbours_for(std::size_t sample_size) {
-  return std::max(1, static_cast<int>(std::lround(std::sqrt(static_cast<double>(sample_size)))));
+  return std::max(1, static_cast<int>(std::lround(0.5 * std::sqrt(static_cast<double>(sample_size)))));
 }
 
 void ColourSample::add(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {

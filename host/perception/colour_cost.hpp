@@ -10,7 +10,7 @@ namespace swarmfit::perception {
 
 /// Hue (circular), lightness and saturation, all in [0, 1].
 struct Hls {
-  float h = 0, l = 0, s = 0;
+  float h, l, s;
 };
 
 Hls to_hls(std::uint8_t red, std::uint8_t green, std::uint8_t blue);
@@ -28,7 +28,7 @@ inline float colour_distance(const Hls& a, const Hls& b) {
   return ds * ds + (1 - ds) * dhl;                                                         // Eq. (6)
 }
 
-/// K of the colour cost, from the sample's size: its square root.
+/// K of the colour cost, from the sample's size: half its square root.
 int neighbours_for(std::size_t sample_size);
 
 /// The colours of a label's sample. The cost of a colour is its mean distance to the K nearest of them.

@@ -111,11 +111,12 @@ PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) c
 }
 
 PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles, std::vector<Label>& labels) const {
-  for (int cycle = 0; cycle < cycles; ++cycle) {
-    Cost fall = 0;
-    for (const Label alpha : order) fall += expand(alpha, labels);
-    if (fall == 0) break;
-  }
+  std::size_t still = 0;  // expansions in a row that found nothing; after all of `order`, none can
+  for (int cycle = 0; cycle < cycles && still < order.size(); ++cycle)
+    for (const Label alpha : order) {
+      still = expand(alpha, labels) > 0 ? 1 : still + 1;
+      if (still >= order.size()) break;
+    }
   return energy(labels);
 }
 

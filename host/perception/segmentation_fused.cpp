@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
+#include <opencv2/imgproc.hpp>
 
 #include "host/perception/graph_cut.hpp"
 #include "host/perception/segmentation_grid.hpp"
@@ -15,6 +17,7 @@ namespace {
 
 using Label = PottsEnergy::Label;
 constexpr Label kBackground = 0;
+constexpr double kDearest = 8;             // above any cost below
 constexpr int kFixed = -1, kOutside = -2;  // instead of a node's number
 
 /// exp(-x) for x in [0, 16), by steps.
@@ -53,7 +56,7 @@ class FusedCut {
     for (const SoiRegion& region : regions_) {
       planes_.push_back(region.label != 0 ? fit_plane(region) : std::nullopt);
       if (region.label != 0) {
-        colours_.push_back(soi_colours(input_, grid_, region, options_.colour_neighbours, 5, tuning_.largest_sample));
+        colours_.push_back(soi_colours(input_, grid_, region, options_.colour_neighbours, 4, tuning_.largest_sample));
       } else {
         colours_.emplace_back();
       }
@@ -89,33 +92,33 @@ class FusedCut {
   void find_nodes() {
     labels_.assign(grid_.size(), kBackground);
     node_.assign(grid_.size(), kOutside);
-    for (const SoiRegion& region : regions_)
+    for (const SoiRegion& region : regions_) {
+      if (region.label == 0) continue;
+      // A pixel of the group is settled where all depth around is of the same group.
+      cv::Mat1b strange(region.rect.size()), near_strange;
+      for (int y = 0; y < region.rect.height; ++y)
+        for (int x = 0; x < region.rect.width; ++x) {
+          const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
+          strange(y, x) = input_.popout[i] != region.label && grid_.finite(i) ? 255 : 0;
+        }
+      cv::dilate(strange, near_strange, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
       for (int y = 0; y < region.rect.height; ++y)
         for (int x = 0; x < region.rect.width; ++x) {
           const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
           const std::uint16_t own = input_.popout[i];
           if (own == region.label) {
             labels_[i] = own;
-            node_[i] = inside(region.rect.x + x, region.rect.y + y, own) ? kFixed : 0;
-          } else if (own == 0 && region.distance(y, x) <= (grid_.finite(i) ? band_ : reach_)) {
+            node_[i] = near_strange(y, x) == 0 ? kFixed : 0;
+          } else if (own == 0 && region.distance(y, x) <= (strange(y, x) != 0 ? band_ : reach_)) {
             node_[i] = 0;
           }
         }
+    }
     for (std::size_t i = 0; i < node_.size(); ++i)
       if (node_[i] == 0) {
         node_[i] = static_cast<int>(active_.size());
         active_.push_back(i);
       }
-  }
-
-  /// Whether all depth around is of the same group.
-  bool inside(int u, int v, std::uint16_t label) const {
-    for (int y = std::max(v - 2, 0); y <= std::min(v + 2, grid_.height() - 1); ++y)
-      for (int x = std::max(u - 2, 0); x <= std::min(u + 2, grid_.width() - 1); ++x) {
-        const std::size_t i = grid_.index(x, y);
-        if (input_.popout[i] != label && grid_.finite(i)) return false;
-      }
-    return true;
   }
 
   std::optional<LocalPlane> fit_plane(const SoiRegion& region) const {
@@ -161,11 +164,17 @@ class FusedCut {
   }
 
   void find_pairs() {
-    std::vector<Hls> hls(grid_.size(), Hls{0, 0, -1});
+    // Left as it comes from the system: only the pages around objects are ever touched.
+    const std::unique_ptr<Hls[]> hls(new Hls[grid_.size()]);
+    std::vector<bool> known(grid_.size());
     const auto colour = [&](std::size_t i) -> const Hls& {
-      if (hls[i].s < 0) hls[i] = to_hls(grid_.rgb(i)[0], grid_.rgb(i)[1], grid_.rgb(i)[2]);
+      if (!known[i]) {
+        hls[i] = to_hls(grid_.rgb(i)[0], grid_.rgb(i)[1], grid_.rgb(i)[2]);
+        known[i] = true;
+      }
       return hls[i];
     };
+    pairs_.reserve(5 * active_.size());
     constexpr std::array<std::array<int, 2>, 8> around = {{{1, 0}, {-1, 1}, {0, 1}, {1, 1}, {-1, 0}, {1, -1}, {0, -1}, {-1, -1}}};
     for (const std::size_t p : active_) {
       const int u = static_cast<int>(p % static_cast<std::size_t>(grid_.width())),
@@ -216,7 +225,7 @@ class FusedCut {
       };
       const std::size_t i = active_[n];
       const std::uint8_t* rgb = grid_.rgb(i);
-      double background = 1;
+      double background = kDearest;
       const bool seen = grid_.finite(i);
       for (const SoiRegion& region : regions_) {
         if (region.label == 0) continue;
@@ -228,8 +237,10 @@ class FusedCut {
         // Shares of the sum tell more than the distances themselves.
         const double sum = as_object + as_background + tuning_.colour_floor;
         const double object_share = (as_object + tuning_.colour_floor / 2) / sum, background_share = 1 - object_share;
-        double object = object_share + tuning_.spatial * far / reach_;
-        double here = background_share;
+        // A colour that neither sample knows makes both dear, so that the third label is cheapest.
+        const double alien = tuning_.alien * std::min(as_object, as_background);
+        double object = object_share + tuning_.spatial * far / reach_ + alien;
+        double here = background_share + alien;
         if (seen) {
           const double risen = rise(region, i);  // 0 on the plane, 1 off it
           object = tuning_.colour_with_depth * object + tuning_.depth * (1 - risen);
@@ -248,14 +259,30 @@ class FusedCut {
   double rise(const SoiRegion& region, std::size_t i) const {
     if (input_.popout[i] == region.label) return 1;
     const auto& plane = planes_[region.label - 1U];
-    if (!plane) return 0;
-    const double height = plane->height(grid_.point(i));
-    // What is neither on the plane nor in the group, and far from it, is something else.
-    if ((grid_.point(i) - input_.sois[region.label - 1U].centre).norm() > input_.sois[region.label - 1U].radius ||
-        height < -2 * options_.min_height)
-      return 0;
-    return std::clamp((height - tuning_.rise_from * plane->sigma) / (options_.min_height - tuning_.rise_from * plane->sigma + 1e-9), 0.0,
-                      1.0);
+    const SpaceOfInterest& soi = input_.sois[region.label - 1U];
+    // What lies outside the space of interest is something else.
+    if (!plane || (grid_.point(i) - soi.centre).norm() > soi.radius) return 0;
+    const double height = mean_height(*plane, i), from = tuning_.rise_from * plane->sigma;
+    if (height < -2 * options_.min_height) return 0;
+    return std::clamp((height - from) / std::max(options_.min_height - from, 1e-4), 0.0, 1.0);
+  }
+
+  /// Of the pixel and its neighbours that are in no group: noise, but not a step, goes away.
+  double mean_height(const LocalPlane& plane, std::size_t i) const {
+    const int u = static_cast<int>(i % static_cast<std::size_t>(grid_.width())),
+              v = static_cast<int>(i / static_cast<std::size_t>(grid_.width()));
+    double sum = 0, count = 0;
+    const double centre = plane.height(grid_.point(i));
+    for (int y = std::max(v - 1, 0); y <= std::min(v + 1, grid_.height() - 1); ++y)
+      for (int x = std::max(u - 1, 0); x <= std::min(u + 1, grid_.width() - 1); ++x) {
+        const std::size_t j = grid_.index(x, y);
+        if (input_.popout[j] != 0 || !grid_.finite(j)) continue;
+        const double height = plane.height(grid_.point(j));
+        if (std::abs(height - centre) > options_.flood_step) continue;
+        sum += height;
+        ++count;
+      }
+    return count > 0 ? sum / count : centre;
   }
 
   const SegmentationInput& input_;

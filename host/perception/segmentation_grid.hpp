@@ -66,17 +66,18 @@ std::vector<std::uint16_t> segment_paper(const SegmentationInput& input, const P
 /// Weights of the fused cut, chosen on labelled Kinect frames.
 struct FusedTuning {
   double band = 6;                 ///< seen pixels farther from every group are background [px at 640 columns]
-  double reach = 16;               ///< so are unseen ones farther than this
-  double smoothness = 0.6;         ///< of a boundary between two alike pixels side by side
+  double reach = 20;               ///< so are unseen ones farther than this
+  double smoothness = 0.8;         ///< of a boundary between two alike pixels side by side
   double flat = 0.1;               ///< share of that which contrast cannot take away
   double at_jump = 0.2;            ///< share that is left where the depth breaks
   double uncertain = 0.6;          ///< cost of the third label, for unseen pixels
-  double depth = 1.5;              ///< what the depth says, where there is one
+  double depth = 1.2;              ///< what the depth says, where there is one
   double colour_with_depth = 0.3;  ///< and how much the colour counts beside it
-  double rise_from = 2;            ///< heights below this many sigma speak for the plane
-  double spatial = 0.5;            ///< of the distance from the group, at reach
+  double rise_from = 0.5;          ///< heights below this many sigma speak for the plane
+  double spatial = 0.15;           ///< of the distance from the group, at reach
   double colour_floor = 0.05;      ///< two colour costs well below this tell nothing
-  std::size_t largest_sample = 256;
+  double alien = 1.5;              ///< of a colour's distance to both samples
+  std::size_t largest_sample = 128;
 };
 
 /// One cut for all SOIs, with what the depth knows. segmentation_fused.cpp
