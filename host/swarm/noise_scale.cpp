@@ -11,7 +11,8 @@ namespace {
 constexpr double kSigmas = 2.5;         // 98.8 % of a Gaussian lie within
 constexpr double kGenerous = 0.08;      // first threshold, in units of the cloud's own spread
 constexpr double kLeast = 1e-6;         // no threshold below this, in the same units: float coordinates carry no more
-constexpr int kRounds = 6;
+constexpr int kRounds = 10;
+constexpr std::size_t kModels = 4;      // the most prominent ones tell the scale
 
 }  // namespace
 
@@ -48,9 +49,10 @@ Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, kernel
   double tau = kGenerous * unit;
   std::vector<float> distances(points.size());
   for (int round = 0; round < kRounds; ++round) {
-    Settings settings = resolve(options, points.finite_count(), tau);
-    settings.joint = true;
-    MultiModel search(evaluator, scout, space, points, settings, options.seed + static_cast<std::uint64_t>(round) + 1, Limits{});
+    const Settings settings = resolve(options, points.finite_count(), tau);
+    Limits limits;
+    limits.max_models = kModels;
+    MultiModel search(evaluator, scout, space, points, settings, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
     // Median over the models' points: each model votes with what it holds.
@@ -63,7 +65,10 @@ Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, kernel
       votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), model.inliers);
       total += model.inliers;
     }
-    if (votes.empty()) break;
+    if (votes.empty()) {  // so wide that nothing stands out from what surrounds it
+      tau /= 2;
+      continue;
+    }
     std::sort(votes.begin(), votes.end());
     std::size_t below = 0;
     double sigma = votes.back().first;
