@@ -65,6 +65,7 @@ Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::
   Cloud cloud;
   back_project(z, calib->left, cloud);
   take_colours(*left, cloud);
+  cloud.passive_stereo = true;
   return cloud;
 }
 

@@ -10,6 +10,8 @@
 
 #include "host/perception/grid.hpp"
 #include "host/perception/objects.hpp"
+#include "host/perception/overview.hpp"
+#include "host/perception/plane_search.hpp"
 #include "host/perception/popout.hpp"
 #include "host/perception/recognition.hpp"
 #include "host/perception/segmentation.hpp"
@@ -23,7 +25,9 @@ using perception::PointGrid;
 using perception::Surface;
 
 constexpr std::size_t kPlanesOfFirstView = 6;  // enough to see which direction the room's planes share
-constexpr double kExtentMargin = 0.02;         // [m] things stand a little over the edge of what is seen of a table
+constexpr double kStereoThreshold = 0.015;     // [m] unless one is given: matching is coarser than a depth camera
+constexpr double kStereoAngle = 0.01;          // [rad] from the first view's ground
+constexpr double kStereoAngleFromWall = 0.06;  // [rad] the vertical is less sure then
 constexpr double kFullFrame = 640.0 * 480.0;   // min_soi_points is for a frame of this size
 
 class Stopwatch {
@@ -43,29 +47,13 @@ std::size_t scaled_min_points(const PointGrid& grid, std::size_t min_soi_points)
   return std::max<std::size_t>(1, static_cast<std::size_t>(share * static_cast<double>(min_soi_points)));
 }
 
-/// Normals towards up. The covariance of -p is that of p.
-void turn_up(std::vector<Model>& models, const Eigen::Vector3d& up) {
-  for (auto& model : models)
-    if (model.normal().dot(up) < 0) model.parameters = -model.parameters;
-}
-
-perception::LocalPlane to_local(const Model& model, const PointGrid& grid) {
-  return {model.normal().cast<float>(), static_cast<float>(model.offset() + model.normal().dot(grid.origin))};
-}
-
-/// A plane keeps the points of its surfaces, but for what belongs to things that stand on it.
-void settle_labels(const PointGrid& grid, const std::vector<Surface>& supports, const std::vector<std::uint16_t>& objects, FitResult& fit) {
-  std::vector<const Surface*> support_of(fit.models.size() + 1, nullptr);
-  for (const auto& surface : supports) support_of[static_cast<std::size_t>(surface.model)] = &surface;
-  for (auto& model : fit.models) model.inliers = 0;
+/// A supporting plane does not keep what belongs to things that stand on it.
+void give_to_objects(const std::vector<std::uint16_t>& objects, FitResult& fit) {
   for (std::size_t i = 0; i < fit.labels.size(); ++i) {
     auto& label = fit.labels[i];
-    if (label == 0) continue;
-    if (const Surface* surface = support_of[label]; surface != nullptr) {
-      const int cell = surface->cell_of(grid.points[i]);
-      if (objects[i] != 0 || cell < 0 || surface->component[static_cast<std::size_t>(cell)] == 0) label = 0;
-    }
-    if (label != 0) ++fit.models[label - 1u].inliers;
+    if (label == 0 || objects[i] == 0 || !fit.models[label - 1u].supporting) continue;
+    --fit.models[label - 1u].inliers;
+    label = 0;
   }
 }
 
@@ -73,31 +61,53 @@ void settle_labels(const PointGrid& grid, const std::vector<Surface>& supports, 
 
 struct Perceiver::State {
   PerceiveOptions options;
+  bool stereo = false;
   std::optional<perception::Vertical> vertical;
   std::optional<Fitter> free_fitter;     ///< any plane, until the vertical is known
   std::optional<Fitter> support_fitter;  ///< horizontal planes
   std::optional<perception::Gallery> gallery;
 
+  Expected<> make_free_fitter();
   Expected<> make_support_fitter();
-  Expected<> find_vertical(const Cloud& frame, const PointGrid& grid, const std::stop_token& stop, PerceiveResult& result);
-  Expected<> fit_supports(const Cloud& frame, const PointGrid& grid, const ModelCallback& on_plane, const std::stop_token& stop,
-                          PerceiveResult& result);
-  std::vector<Surface> supporting_surfaces(const PointGrid& grid, FitResult& fit) const;
+  Expected<> suit_sensor(const Cloud& frame);
+  Expected<> find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop, PerceiveResult& result);
   void find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const;
 };
 
+Expected<> Perceiver::State::make_free_fitter() {
+  FitOptions fit = options.fit;
+  fit.prior.reset();
+  fit.max_models = kPlanesOfFirstView;
+  auto made = Fitter::create(fit);
+  if (!made) return tl::unexpected(made.error());
+  free_fitter.emplace(std::move(*made));
+  return {};
+}
+
+Expected<> Perceiver::State::suit_sensor(const Cloud& frame) {
+  stereo = frame.passive_stereo;
+  if (!frame.passive_stereo || options.fit.threshold || options.fit.estimate_threshold) return {};
+  options.fit.threshold = kStereoThreshold;
+  if (vertical) return make_support_fitter();
+  return make_free_fitter();
+}
+
 Expected<> Perceiver::State::make_support_fitter() {
   FitOptions fit = options.fit;
-  fit.prior = DirectionPrior{vertical->up, options.horizontal_angle};
+  // What is level in one room is level to each other; and without normals there is little else to tell a surface from clutter.
+  const bool narrow = stereo && !options.gravity && !options.camera_tilt;
+  const double angle = vertical->source == perception::kFromDominantPlane ? kStereoAngle : kStereoAngleFromWall;
+  fit.prior = DirectionPrior{vertical->up, narrow ? std::min(options.horizontal_angle, angle) : options.horizontal_angle};
   auto made = Fitter::create(fit);
   if (!made) return tl::unexpected(made.error());
   support_fitter.emplace(std::move(*made));
   return {};
 }
 
-Expected<> Perceiver::State::find_vertical(const Cloud& frame, const PointGrid& grid, const std::stop_token& stop, PerceiveResult& result) {
+Expected<> Perceiver::State::find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
+                                           PerceiveResult& result) {
   if (vertical) return {};
-  auto planes = free_fitter->fit(frame.points(), {}, stop);
+  auto planes = perception::find_any_planes(*free_fitter, overview, stop);
   if (!planes) return tl::unexpected(planes.error());
   vertical = perception::vertical_from_planes(grid, planes->models, options.horizontal_angle);
   if (vertical) {
@@ -106,42 +116,10 @@ Expected<> Perceiver::State::find_vertical(const Cloud& frame, const PointGrid& 
   }
   // Nothing flat in this view; the next one may have it.
   planes->models.clear();
-  planes->labels.assign(frame.size(), 0);
+  planes->labels.assign(grid.size(), 0);
+  planes->finite_points = grid.finite;
   result.fit = std::move(*planes);
   return {};
-}
-
-Expected<> Perceiver::State::fit_supports(const Cloud& frame, const PointGrid& grid, const ModelCallback& on_plane,
-                                          const std::stop_token& stop, PerceiveResult& result) {
-  const double reasonable = options.min_plane_share * static_cast<double>(grid.finite);
-  bool too_small = false;
-  const auto on_model = [&](const Model& model) {
-    too_small = static_cast<double>(model.inliers) < reasonable;
-    if (too_small) return Verdict::stop;
-    return on_plane ? on_plane(model) : Verdict::go_on;
-  };
-  auto fitted = support_fitter->fit(frame.points(), on_model, stop);
-  if (!fitted) return tl::unexpected(fitted.error());
-  result.fit = std::move(*fitted);
-  if (!too_small) return {};
-  const auto last = result.fit.models.size();
-  result.fit.models.pop_back();
-  for (auto& label : result.fit.labels)
-    if (label == last) label = 0;
-  result.fit.stop_reason = "no plane of reasonable size is left";
-  return {};
-}
-
-std::vector<Surface> Perceiver::State::supporting_surfaces(const PointGrid& grid, FitResult& fit) const {
-  std::vector<Surface> surfaces, supports;
-  for (std::size_t k = 0; k < fit.models.size(); ++k)
-    surfaces.push_back(perception::make_surface(grid, fit.labels, static_cast<int>(k + 1), to_local(fit.models[k], grid), kExtentMargin));
-  const auto supporting = perception::choose_supporting(surfaces, options.max_height);
-  for (std::size_t k = 0; k < surfaces.size(); ++k) {
-    fit.models[k].supporting = supporting[k];
-    if (supporting[k]) supports.push_back(std::move(surfaces[k]));
-  }
-  return supports;
 }
 
 void Perceiver::State::find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const {
@@ -179,12 +157,7 @@ Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) {
   if (state->vertical) {
     if (auto ok = state->make_support_fitter(); !ok) return tl::unexpected(ok.error());
   } else {
-    FitOptions fit = options.fit;
-    fit.prior.reset();
-    fit.max_models = kPlanesOfFirstView;
-    auto made = Fitter::create(fit);
-    if (!made) return tl::unexpected(made.error());
-    state->free_fitter.emplace(std::move(*made));
+    if (auto ok = state->make_free_fitter(); !ok) return tl::unexpected(ok.error());
   }
   if (!options.gallery.empty()) {
     auto loaded = perception::Gallery::load(options.gallery);
@@ -199,20 +172,24 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
     return fail(Error::Kind::bad_input, fmt::format("the cloud has {} columns, must have 3 to perceive", frame.dimension));
   Stopwatch whole, stage;
   PerceiveResult result;
+  if (auto ok = state_->suit_sensor(frame); !ok) return tl::unexpected(ok.error());
   const auto grid = perception::make_grid(frame);
-  if (auto ok = state_->find_vertical(frame, grid, stop, result); !ok) return tl::unexpected(ok.error());
+  if (grid.finite < 3) return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= 3 to perceive", grid.finite, frame.size()));
+  const auto overview = perception::make_overview(grid, frame);
+  if (auto ok = state_->find_vertical(grid, overview, stop, result); !ok) return tl::unexpected(ok.error());
   result.vertical_source = state_->vertical ? state_->vertical->source : "dominant plane";
   result.popout.assign(frame.size(), 0);
   std::vector<Surface> supports;
   if (state_->vertical) {
     result.up = state_->vertical->up;
-    if (auto ok = state_->fit_supports(frame, grid, on_plane, stop, result); !ok) return tl::unexpected(ok.error());
-    turn_up(result.fit.models, result.up);
-    supports = state_->supporting_surfaces(grid, result.fit);
+    auto search = perception::find_supports(*state_->support_fitter, grid, overview, result.up, state_->options, on_plane, stop);
+    if (!search) return tl::unexpected(search.error());
+    result.fit = std::move(search->fit);
+    supports = std::move(search->supports);
   }
   result.timing_ms.fit = stage.lap();
   if (!supports.empty() && !stop.stop_requested()) state_->find_objects(grid, supports, result);
-  settle_labels(grid, supports, result.popout, result.fit);
+  give_to_objects(result.popout, result.fit);
   result.timing_ms.popout = stage.lap();
   if (frame.organised() && frame.coloured() && !stop.stop_requested()) {
     result.objects = perception::segment_objects({frame, result.fit.labels, result.popout, result.sois}, state_->options);

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include <Eigen/Eigenvalues>
 
@@ -16,8 +17,10 @@ constexpr float kGap = 0.12f;            // [m] parts of a plane this near are o
 constexpr float kEdge = 0.05f;           // [m] nearer to the hull is its edge
 constexpr int kUnbroken = 2;             // [cells] a piece has no wider gaps
 constexpr double kSplinter = 0.03;       // of the largest surface's area; smaller parts are none
-constexpr double kTopArea = 0.09;        // [m^2] the largest top of a thing that is carried
+constexpr double kTopArea = 0.07;        // [m^2] the largest top of a thing that is carried
 constexpr double kTopLength = 0.45;      // [m] and its longest side
+constexpr double kSeatHeight = 0.28;     // [m] from here on it is rather a piece of furniture, and a thing's top is smaller:
+constexpr double kHighTopArea = 0.03;    // [m^2]
 constexpr double kReasonableArea = 0.01; // [m^2] nothing smaller carries anything
 constexpr float kNoiseAtOneMetre = 0.0015f;  // [m] where there are too few inliers to measure it
 
@@ -149,22 +152,8 @@ void lay_out_cells(const PointGrid& grid, const std::vector<std::uint32_t>& memb
   surface.rows = static_cast<int>(size.y() / surface.cell) + 1;
 }
 
-/// Heights of the inliers over range^2, robustly.
-double measure_noise(const PointGrid& grid, const std::vector<std::uint32_t>& members, const LocalPlane& plane) {
-  std::vector<float> scaled;
-  const std::size_t step = std::max<std::size_t>(1, members.size() / 5000);
-  for (std::size_t k = 0; k < members.size(); k += step) {
-    const auto& p = grid.points[members[k]];
-    scaled.push_back(std::abs(plane.height(p)) / std::max(0.25f, p.squaredNorm()));
-  }
-  if (scaled.size() < 50 || !grid.organised()) return kNoiseAtOneMetre;
-  const auto middle = scaled.begin() + static_cast<std::ptrdiff_t>(scaled.size() / 2);
-  std::nth_element(scaled.begin(), middle, scaled.end());
-  return 1.4826 * static_cast<double>(*middle);
-}
-
-/// The larger surface that `small` lies above, within its extent; -1 none.
-bool rests_on(const Surface& small, const Surface& large, double max_height) {
+/// How far `small` lies above `large`, within its extent; nothing where it does not.
+std::optional<double> rise_above(const Surface& small, const Surface& large) {
   std::size_t over = 0, cells = 0;
   double rise = 0;
   for (int b = 0; b < small.rows; ++b)
@@ -177,9 +166,8 @@ bool rests_on(const Surface& small, const Surface& large, double max_height) {
       over += large.contains(p) ? 1 : 0;
       rise += static_cast<double>(large.plane.height(p));
     }
-  if (cells == 0) return false;
-  rise /= static_cast<double>(cells);
-  return 2 * over > cells && rise > 0 && rise < max_height;
+  if (cells == 0 || 2 * over <= cells || rise <= 0) return std::nullopt;
+  return rise / static_cast<double>(cells);
 }
 
 }  // namespace
@@ -193,7 +181,7 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
   std::vector<std::uint32_t> members;
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (labels[i] == model && PointGrid::seen(grid.points[i])) members.push_back(static_cast<std::uint32_t>(i));
-  surface.noise = measure_noise(grid, members, plane);
+  surface.noise = kNoiseAtOneMetre;
   if (members.empty()) return surface;
   lay_out_cells(grid, members, margin, surface);
 
@@ -224,6 +212,25 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
   return surface;
 }
 
+bool Surface::near_component(const Eigen::Vector3f& p, float reach) const noexcept {
+  const int steps = static_cast<int>(reach / cell);
+  const int a0 = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell)), b0 = static_cast<int>(std::floor((axis_b.dot(p) - low.y()) / cell));
+  for (int b = std::max(0, b0 - steps); b <= std::min(rows - 1, b0 + steps); ++b)
+    for (int a = std::max(0, a0 - steps); a <= std::min(columns - 1, a0 + steps); ++a)
+      if (component[static_cast<std::size_t>(b * columns + a)] != 0) return true;
+  return false;
+}
+
+double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> labels, const Surface& surface) {
+  std::vector<float> scaled;
+  for (std::size_t i = 0; i < grid.size(); i += 7)
+    if (labels[i] == surface.model) scaled.push_back(std::abs(surface.plane.height(grid.points[i])) / std::max(0.25f, grid.points[i].squaredNorm()));
+  if (scaled.size() < 50 || !grid.organised()) return kNoiseAtOneMetre;
+  const auto middle = scaled.begin() + static_cast<std::ptrdiff_t>(scaled.size() / 2);
+  std::nth_element(scaled.begin(), middle, scaled.end());
+  return 1.4826 * static_cast<double>(*middle);
+}
+
 std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double max_height) {
   std::vector<bool> supporting(surfaces.size(), false);
   std::vector<std::size_t> by_area(surfaces.size());
@@ -231,10 +238,13 @@ std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double ma
   std::stable_sort(by_area.begin(), by_area.end(), [&](std::size_t a, std::size_t b) { return surfaces[a].area > surfaces[b].area; });
   for (const auto i : by_area) {
     if (surfaces[i].area < kReasonableArea) continue;
-    const bool small = surfaces[i].piece_area < kTopArea && surfaces[i].piece_length < kTopLength;
     supporting[i] = true;
-    for (std::size_t j = 0; j < surfaces.size() && small; ++j)
-      if (supporting[j] && surfaces[j].area > 2 * surfaces[i].area && rests_on(surfaces[i], surfaces[j], max_height)) supporting[i] = false;
+    if (surfaces[i].piece_area >= kTopArea || surfaces[i].piece_length >= kTopLength) continue;
+    for (std::size_t j = 0; j < surfaces.size(); ++j) {
+      if (j == i || !supporting[j] || surfaces[j].area <= 2 * surfaces[i].area) continue;
+      const auto rise = rise_above(surfaces[i], surfaces[j]);
+      if (rise && *rise < max_height && (*rise < kSeatHeight || surfaces[i].piece_area < kHighTopArea)) supporting[i] = false;
+    }
   }
   return supporting;
 }

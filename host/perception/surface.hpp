@@ -22,7 +22,7 @@ struct Surface {
   double area = 0;                          ///< seen by the sensor, all kept surfaces [m^2]
   double piece_area = 0;                    ///< hull of the largest unbroken piece [m^2]
   double piece_length = 0;                  ///< of that piece, along its principal axis [m]
-  double noise = 0;                         ///< standard deviation of the inliers' heights at a range of one metre; grows with range^2
+  double noise = 0;                         ///< standard deviation of the inliers' heights at a range of one metre; grows with its square
 
   int cell_of(const Eigen::Vector3f& p) const noexcept {
     const int a = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell));
@@ -33,6 +33,12 @@ struct Surface {
     const int at = cell_of(p);
     return at >= 0 && extent[static_cast<std::size_t>(at)] != 0;
   }
+  bool on_component(const Eigen::Vector3f& p) const noexcept {
+    const int at = cell_of(p);
+    return at >= 0 && component[static_cast<std::size_t>(at)] != 0;
+  }
+  /// Whether a kept surface has a cell within `reach` [m].
+  bool near_component(const Eigen::Vector3f& p, float reach) const noexcept;
   bool at_edge(const Eigen::Vector3f& p) const noexcept {
     const int at = cell_of(p);
     return at < 0 || extent[static_cast<std::size_t>(at)] < 2;
@@ -43,6 +49,9 @@ struct Surface {
 
 /// `labels[i] == model` marks the plane's points. `margin` [m] widens the hull.
 Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> labels, int model, const LocalPlane& plane, double margin);
+
+/// Standard deviation of the heights of the surface's points at a range of one metre, robustly.
+double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> labels, const Surface& surface);
 
 /// Which surfaces support: of reasonable size, and not the top of a thing that stands on a larger one.
 std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double max_height);

@@ -8,10 +8,11 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr double kRises = 0.12;       // a plane whose normal leans this far to the image's top is seen from above: a floor or a table
+constexpr double kRises = 0.3;        // a plane whose normal leans this far to the image's top is seen from above: a floor or a table
 constexpr double kWallWeight = 0.2;   // one that faces the camera may be a wall as well as a table seen from straight above
 constexpr double kCeilingWeight = 0.02;
-constexpr double kLeans = 0.5;        // across the image; cameras are seldom rolled
+constexpr double kLeans = 0.35;       // across the image; cameras are seldom rolled
+constexpr double kParallel = 0.995;   // cosine of 6 degrees
 constexpr double kLeanWeight = 0.2;
 
 /// Where the image's right and its bottom lie in the cloud's frame; empty without an image grid.
@@ -79,14 +80,18 @@ std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<co
   const Eigen::Vector3d normal = normals[best];
   if (axes && std::abs(normal.dot(axes->down)) < kRises) {
     const bool sideways = std::abs(normal.dot(axes->right)) >= kLeans;
-    bool only_walls = true;
-    for (std::size_t i = 0; i < normals.size(); ++i) only_walls = only_walls && std::abs(normals[i].dot(axes->down)) < 0.5;
-    if (sideways || (planes.size() > 1 && only_walls)) {
+    // Seen from straight above, tables and the things on them are parallel; walls and fronts are not.
+    bool only_walls = true, parallel = true;
+    for (const auto& other : normals) {
+      only_walls = only_walls && std::abs(other.dot(axes->down)) < 0.5;
+      parallel = parallel && std::abs(other.dot(normal)) > kParallel;
+    }
+    if (sideways || (only_walls && !parallel)) {
       const Eigen::Vector3d up = -axes->down + normal * normal.dot(axes->down);
-      return Vertical{up.normalized(), "dominant plane (a wall)"};
+      return Vertical{up.normalized(), kFromWall};
     }
   }
-  return Vertical{normal, "dominant plane"};
+  return Vertical{normal, kFromDominantPlane};
 }
 
 }  // namespace swarmfit::perception

@@ -13,6 +13,9 @@
 
 namespace swarmfit::perception {
 
+inline constexpr const char* kFromDominantPlane = "dominant plane";
+inline constexpr const char* kFromWall = "dominant plane (a wall)";
+
 struct Vertical {
   Eigen::Vector3d up = Eigen::Vector3d::Zero();  ///< unit, against gravity
   std::string source;

@@ -27,6 +27,7 @@ struct Cloud {
   std::vector<std::uint8_t> rgb;        ///< 3 a point (red, green, blue), or empty
   int width = 0, height = 0;            ///< height > 1: organised, point (u, v) is at v * width + u; else height is 1
   std::optional<Intrinsics> intrinsics; ///< of the camera behind an organised cloud, where known
+  bool passive_stereo = false;          ///< the depth was matched between images: little worth where they have no texture
 
   std::size_t size() const noexcept {
     return (values64.empty() ? values32.size() : values64.size()) / static_cast<std::size_t>(dimension);

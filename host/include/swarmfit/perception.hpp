@@ -24,7 +24,7 @@ struct PerceiveOptions {
   std::optional<Eigen::Vector3d> gravity;  ///< direction of gravity in the cloud's frame; length does not matter, not zero
   std::optional<double> camera_tilt;       ///< [rad] the camera looks down by this much below the horizon, in [-pi/2, pi/2]; x right, y down, z forward
   double horizontal_angle = 0.20;          ///< [rad] a supporting plane's normal is within this of the vertical, in (0, pi/2)
-  double min_plane_share = 0.02;           ///< of the finite points a plane of reasonable size holds, in (0, 1)
+  double min_plane_share = 0.005;          ///< of the finite points a plane of reasonable size holds, in (0, 1)
   double min_height = 0.008;               ///< [m] a point sticks out when it is at least this far above its plane
   double max_height = 0.6;                 ///< [m] and at most this far
   double flood_step = 0.02;                ///< [m] neighbours in the flood fill are at most this far apart

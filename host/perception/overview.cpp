@@ -1,0 +1,122 @@
+#include "host/perception/overview.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include <Eigen/Geometry>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr int kCoarseWidth = 320;
+constexpr int kBaseline = 4;         // [cells] over which a normal is taken
+constexpr float kBlockReach = 4.0f;  // points of a block are within this many footprints of its first: no mean across a depth edge
+constexpr int kEdgeReach = 2;         // [px]
+constexpr int kEdge = 15;            // sum of the three channels: below is noise
+constexpr float kBend = 0.3f;        // of the baseline's length: farther off its middle the surface bends
+
+void average_blocks(const PointGrid& grid, Overview& overview) {
+  auto& cells = overview.cells;
+  for (int cv = 0; cv < cells.height; ++cv)
+    for (int cu = 0; cu < cells.width; ++cu) {
+      Eigen::Vector3f first = Eigen::Vector3f::Zero(), sum = Eigen::Vector3f::Zero();
+      float count = 0, reach = 0;
+      for (int v = cv * overview.stride; v < (cv + 1) * overview.stride; ++v)
+        for (int u = cu * overview.stride; u < (cu + 1) * overview.stride; ++u) {
+          const auto& p = grid.points[static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u)];
+          if (!PointGrid::seen(p)) continue;
+          if (count == 0) {
+            first = p;
+            const float radius = kBlockReach * static_cast<float>(overview.stride) * grid.pitch;
+            reach = radius * radius * p.squaredNorm();
+          } else if ((p - first).squaredNorm() > reach) {
+            continue;
+          }
+          sum += p;
+          ++count;
+        }
+      if (count == 0) continue;
+      cells.points[static_cast<std::size_t>(cv * cells.width + cu)] = sum / count;
+      ++cells.finite;
+    }
+}
+
+/// From differences across the cell both ways; zero unless the cell lies amid them.
+Eigen::Vector3f normal_at(const PointGrid& cells, int u, int v) {
+  const auto at = [&](int x, int y) -> const Eigen::Vector3f& { return cells.points[static_cast<std::size_t>(y * cells.width + x)]; };
+  const auto &here = at(u, v), &left = at(u - kBaseline, v), &right = at(u + kBaseline, v), &above = at(u, v - kBaseline), &below = at(u, v + kBaseline);
+  const Eigen::Vector3f across = right - left, along = below - above;
+  const float bend_across = (right + left - 2 * here).squaredNorm(), bend_along = (below + above - 2 * here).squaredNorm();
+  // NaN fails these as well.
+  if (!(bend_across < kBend * kBend * across.squaredNorm() && bend_along < kBend * kBend * along.squaredNorm())) return Eigen::Vector3f::Zero();
+  Eigen::Vector3f normal = across.cross(along);
+  const float length = normal.norm();
+  if (!(length > 0)) return Eigen::Vector3f::Zero();
+  normal /= length;
+  return normal.dot(here) > 0 ? Eigen::Vector3f(-normal) : normal;
+}
+
+/// Cells with or beside an edge across the epipolar lines, which are the image's rows.
+std::vector<std::uint8_t> find_texture(const Cloud& frame, const Overview& overview) {
+  const auto& cells = overview.cells;
+  const auto brightness = [&](int u, int v) {
+    const auto i = 3 * (static_cast<std::size_t>(v) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(u));
+    return frame.rgb[i] + frame.rgb[i + 1] + frame.rgb[i + 2];
+  };
+  std::vector<std::uint8_t> edge(cells.size(), 0), textured(cells.size(), 0);
+  for (int v = 0; v < cells.height * overview.stride; ++v)
+    for (int u = kEdgeReach; u < cells.width * overview.stride && u + kEdgeReach < frame.width; ++u)
+      if (std::abs(brightness(u + kEdgeReach, v) - brightness(u - kEdgeReach, v)) >= kEdge)
+        edge[static_cast<std::size_t>((v / overview.stride) * cells.width + u / overview.stride)] = 1;
+  for (int v = 1; v + 1 < cells.height; ++v)
+    for (int u = 1; u + 1 < cells.width; ++u) {
+      const auto at = static_cast<std::size_t>(v * cells.width + u);
+      textured[at] = edge[at] | edge[at - 1] | edge[at + 1];
+    }
+  return textured;
+}
+
+}  // namespace
+
+Overview make_overview(const PointGrid& grid, const Cloud& frame) {
+  Overview overview;
+  if (!grid.organised()) {
+    overview.cells = grid;
+    return overview;
+  }
+  auto& cells = overview.cells;
+  overview.stride = std::max(1, (grid.width + kCoarseWidth / 2) / kCoarseWidth);
+  cells.width = grid.width / overview.stride;
+  cells.height = grid.height / overview.stride;
+  cells.origin = grid.origin;
+  cells.pitch = grid.pitch * static_cast<float>(overview.stride);
+  const auto count = static_cast<std::size_t>(cells.width) * static_cast<std::size_t>(cells.height);
+  cells.points.assign(count, Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  average_blocks(grid, overview);
+  if (frame.passive_stereo && frame.coloured()) {
+    overview.textured = find_texture(frame, overview);
+    return overview;
+  }
+  overview.normals.assign(count, Eigen::Vector3f::Zero());
+  for (int v = kBaseline; v + kBaseline < cells.height; ++v)
+    for (int u = kBaseline; u + kBaseline < cells.width; ++u)
+      overview.normals[static_cast<std::size_t>(v * cells.width + u)] = normal_at(cells, u, v);
+  return overview;
+}
+
+std::vector<std::uint32_t> flat_cells(const Overview& overview) {
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t i = 0; i < overview.cells.size(); ++i) {
+    const bool flat = overview.has_normals() ? overview.normals[i].squaredNorm() > 0 : PointGrid::seen(overview.cells.points[i]);
+    if (flat && (overview.textured.empty() || overview.textured[i] != 0)) chosen.push_back(static_cast<std::uint32_t>(i));
+  }
+  return chosen;
+}
+
+std::vector<std::uint32_t> flat_cells(const Overview& overview, const Eigen::Vector3f& normal, float least_cosine) {
+  auto chosen = flat_cells(overview);
+  std::erase_if(chosen, [&](std::uint32_t i) { return !overview.agrees(i, normal, least_cosine); });
+  return chosen;
+}
+
+}  // namespace swarmfit::perception

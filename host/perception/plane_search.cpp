@@ -1,0 +1,231 @@
+#include "host/perception/plane_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace swarmfit::perception {
+namespace {
+
+constexpr double kNormalSlack = 0.35;   // [rad] normals of cells are noisy
+constexpr float kAlong = 0.9f;          // cosine: a cell whose normal is farther off does not lie in the plane
+constexpr double kAgreement = 0.5;      // share of a plane's cells that lie along it; less is clutter cut by a slab
+constexpr double kContrast = 2;         // of the density in a surface to that around it
+constexpr std::size_t kFewCells = 10;   // fewer flat cells hold no surface
+constexpr float kFringeOfPlane = 0.06f; // [m] a surface reaches this far beyond the cells that tell its direction
+constexpr double kExtentMargin = 0.02;  // [m] things stand a little over the edge of what is seen of a table
+
+/// The cells as a cloud for the fitter.
+std::vector<float> gather(const Overview& overview, const std::vector<std::uint32_t>& chosen) {
+  std::vector<float> values;
+  values.reserve(3 * chosen.size());
+  for (const auto i : chosen) values.insert(values.end(), overview.cells.points[i].data(), overview.cells.points[i].data() + 3);
+  return values;
+}
+
+LocalPlane to_local(const Model& model) { return {model.normal().cast<float>(), static_cast<float>(model.offset())}; }
+
+/// Normal towards up, and from the grid's local frame to the data's.
+void to_data_frame(Model& model, const Eigen::Vector3d& origin, const Eigen::Vector3d& up) {
+  if (model.normal().dot(up) < 0) model.parameters = -model.parameters;
+  model.parameters[3] -= model.normal().dot(origin);
+  if (model.covariance.rows() != 4) return;
+  Eigen::Matrix4d shift = Eigen::Matrix4d::Identity();
+  shift.row(3).head<3>() = -origin.transpose();
+  model.covariance = shift * model.covariance * shift.transpose();
+}
+
+struct Membership {
+  std::size_t within = 0, along = 0;  // cells within tau that are flat, and those of them that lie along the plane
+};
+
+Membership count_members(const Overview& overview, const std::vector<std::uint32_t>& flat, const LocalPlane& plane, float tau) {
+  Membership count;
+  for (const auto i : flat) {
+    if (std::abs(plane.height(overview.cells.points[i])) > tau) continue;
+    ++count.within;
+    count.along += overview.agrees(i, plane.normal, kAlong) ? 1 : 0;
+  }
+  return count;
+}
+
+/// A fit with no model in it, for a frame in which there is nothing to fit to.
+FitResult nothing(const Fitter& fitter, std::size_t points) {
+  FitResult fit;
+  fit.labels.assign(points, 0);
+  fit.backend = fitter.backend();
+  fit.seed = fitter.options().seed;
+  fit.threshold = fitter.options().threshold.value_or(0.01);
+  fit.stop_reason = "nothing flat to look at";
+  return fit;
+}
+
+/// Labels of the cells: the nearest of the planes, where the cell lies along it.
+std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vector<std::uint32_t>& flat, const std::vector<LocalPlane>& planes,
+                                       float tau) {
+  std::vector<std::uint16_t> labels(overview.cells.size(), 0);
+  for (const auto i : flat) {
+    float nearest = tau;
+    for (std::size_t k = 0; k < planes.size(); ++k) {
+      const float distance = std::abs(planes[k].height(overview.cells.points[i]));
+      if (distance > nearest || !overview.agrees(i, planes[k].normal, kAlong)) continue;
+      nearest = distance;
+      labels[i] = static_cast<std::uint16_t>(k + 1);
+    }
+  }
+  return labels;
+}
+
+/// The surface from the cells that tell its direction, widened by the cells around them that lie in it.
+Surface grow_surface(const Overview& overview, const std::vector<std::uint16_t>& labels, int model, const LocalPlane& plane, float tau) {
+  const auto core = make_surface(overview.cells, labels, model, plane, kExtentMargin + static_cast<double>(kFringeOfPlane));
+  if (!overview.has_normals() && overview.textured.empty()) return make_surface(overview.cells, labels, model, plane, kExtentMargin);
+  auto wider = labels;
+  for (std::size_t i = 0; i < wider.size(); ++i) {
+    const auto& p = overview.cells.points[i];
+    if (PointGrid::seen(p) && std::abs(plane.height(p)) <= tau && core.near_component(p, kFringeOfPlane)) wider[i] = static_cast<std::uint16_t>(model);
+  }
+  return make_surface(overview.cells, wider, model, plane, kExtentMargin);
+}
+
+/// A surface is thin: there is more in it than above and below it. A slab through clutter or across a wall is not.
+bool stands_out(const Overview& overview, const std::vector<std::uint32_t>& cells, const Surface& surface, float tau) {
+  std::size_t within = 0, around = 0;
+  for (const auto i : cells) {
+    const auto& p = overview.cells.points[i];
+    const float distance = std::abs(surface.plane.height(p));
+    if (distance > 3 * tau || !surface.on_component(p)) continue;
+    ++(distance <= tau ? within : around);
+  }
+  // The two bands around are twice as thick as the surface.
+  return static_cast<double>(within) > kContrast * static_cast<double>(around) / 2;
+}
+
+/// Labels, inliers, cost and rms over all points of the frame.
+void settle(const PointGrid& grid, const std::vector<Surface>& surfaces, FitResult& fit) {
+  const auto tau = static_cast<float>(fit.threshold);
+  std::vector<double> squares(surfaces.size(), 0), costs(surfaces.size(), 0);
+  fit.labels.assign(grid.size(), 0);
+  for (auto& model : fit.models) model.inliers = 0;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    const auto& p = grid.points[i];
+    if (!PointGrid::seen(p)) continue;
+    float nearest = tau;
+    for (std::size_t k = 0; k < surfaces.size(); ++k) {
+      const float distance = std::abs(surfaces[k].plane.height(p));
+      costs[k] += static_cast<double>(std::min(distance, tau));
+      if (distance > nearest || !surfaces[k].on_component(p)) continue;
+      nearest = distance;
+      fit.labels[i] = static_cast<std::uint16_t>(k + 1);
+    }
+    if (fit.labels[i] == 0) continue;
+    ++fit.models[fit.labels[i] - 1u].inliers;
+    squares[fit.labels[i] - 1u] += static_cast<double>(nearest) * static_cast<double>(nearest);
+  }
+  for (std::size_t k = 0; k < surfaces.size(); ++k) {
+    auto& model = fit.models[k];
+    model.cost = costs[k];
+    model.rms = model.inliers == 0 ? 0 : std::sqrt(squares[k] / static_cast<double>(model.inliers));
+  }
+}
+
+void erase_models(FitResult& fit, std::vector<Surface>& surfaces, std::size_t least) {
+  least = std::max<std::size_t>(least, 1);
+  std::vector<std::uint16_t> number(fit.models.size() + 1, 0);
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < fit.models.size(); ++k) {
+    if (fit.models[k].inliers < least) continue;
+    if (kept != k) {
+      fit.models[kept] = std::move(fit.models[k]);
+      surfaces[kept] = std::move(surfaces[k]);
+    }
+    ++kept;
+    surfaces[kept - 1].model = static_cast<int>(kept);
+    number[k + 1] = static_cast<std::uint16_t>(kept);
+  }
+  fit.models.resize(kept);
+  surfaces.resize(kept);
+  for (auto& label : fit.labels) label = number[label];
+}
+
+}  // namespace
+
+Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const std::stop_token& stop) {
+  const auto flat = flat_cells(overview);
+  if (overview.has_normals() && flat.size() < kFewCells) return nothing(fitter, overview.cells.size());
+  const auto values = gather(overview, flat);
+  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), {}, stop);
+  if (!fitted) return tl::unexpected(fitted.error());
+  for (auto& model : fitted->models) {
+    const auto count = count_members(overview, flat, to_local(model), static_cast<float>(fitted->threshold));
+    model.inliers = static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within) ? 0 : count.along;
+  }
+  std::erase_if(fitted->models, [](const Model& model) { return model.inliers == 0; });
+  return fitted;
+}
+
+Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const Overview& overview, const Eigen::Vector3d& up,
+                                    const PerceiveOptions& options, const ModelCallback& on_plane, const std::stop_token& stop) {
+  const auto least_cosine = static_cast<float>(std::cos(std::min(1.4, options.horizontal_angle + kNormalSlack)));
+  const auto flat = flat_cells(overview, up.cast<float>(), least_cosine);
+  PlaneSearch search;
+  if (overview.has_normals() && flat.size() < kFewCells) {
+    search.fit = nothing(fitter, grid.size());
+    search.fit.finite_points = grid.finite;
+    return search;
+  }
+  const auto values = gather(overview, flat);
+  const double block = static_cast<double>(overview.stride) * static_cast<double>(overview.stride);
+  // A plane's border has no normals; so cells are given the benefit of the doubt here, and points are counted in the end.
+  const double reasonable = 0.5 * options.min_plane_share * static_cast<double>(grid.finite) / block;
+  const double tau = fitter.options().threshold.value_or(0.01);
+  std::vector<bool> clutter;
+  bool too_small = false;
+  const auto on_model = [&](const Model& model) {
+    too_small = static_cast<double>(model.inliers) < reasonable;
+    if (too_small) return Verdict::stop;
+    const auto count = count_members(overview, flat, to_local(model), static_cast<float>(tau));
+    clutter.push_back(static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within));
+    if (clutter.back() || !on_plane) return Verdict::go_on;
+    Model told = model;
+    to_data_frame(told, grid.origin, up);
+    told.inliers = static_cast<std::size_t>(block * static_cast<double>(model.inliers));
+    return on_plane(told);
+  };
+  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), on_model, stop);
+  if (!fitted) return tl::unexpected(fitted.error());
+  search.fit = std::move(*fitted);
+  auto& fit = search.fit;
+  fit.finite_points = grid.finite;
+  clutter.resize(fit.models.size(), true);  // the one that was too small
+
+  std::vector<Model> models;
+  std::vector<LocalPlane> planes;
+  for (std::size_t k = 0; k < fit.models.size(); ++k) {
+    if (clutter[k]) continue;
+    if (fit.models[k].normal().dot(up) < 0) fit.models[k].parameters = -fit.models[k].parameters;
+    planes.push_back(to_local(fit.models[k]));
+    models.push_back(std::move(fit.models[k]));
+  }
+  fit.models = std::move(models);
+  if (too_small) fit.stop_reason = "no plane of reasonable size is left";
+
+  const auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
+  std::vector<Surface> surfaces;
+  for (std::size_t k = 0; k < planes.size(); ++k)
+    surfaces.push_back(grow_surface(overview, labels, static_cast<int>(k + 1), planes[k], static_cast<float>(fit.threshold)));
+  settle(grid, surfaces, fit);
+  for (std::size_t k = 0; k < surfaces.size(); ++k)
+    if (!overview.has_normals() && !stands_out(overview, flat, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;
+  erase_models(fit, surfaces, static_cast<std::size_t>(options.min_plane_share * static_cast<double>(grid.finite)));
+  const auto supporting = choose_supporting(surfaces, options.max_height);
+  for (std::size_t k = 0; k < surfaces.size(); ++k) {
+    to_data_frame(fit.models[k], grid.origin, up);
+    fit.models[k].supporting = supporting[k];
+    if (!supporting[k]) continue;
+    surfaces[k].noise = measure_noise(grid, fit.labels, surfaces[k]);
+    search.supports.push_back(std::move(surfaces[k]));
+  }
+  return search;
+}
+
+}  // namespace swarmfit::perception
