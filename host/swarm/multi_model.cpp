@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
 constexpr int kRounds = 8;      // of refinement
-constexpr int kFullRounds = 2;  // of it on all points, after it was done on a part of them
+constexpr int kFullRounds = 2;  // of it on all points, where it was done on a part of them before
 constexpr std::size_t kSampledFrom = 8192;  // points that minimal samples are drawn from: enough to tell surfaces apart
 
 }  // namespace
@@ -200,7 +200,10 @@ Expected<> MultiModel::finish(FitResult& result) {
   if (settings_.joint && !found_.empty() && !limits_.stop.stop_requested()) {
     const Ground ground{evaluator_, space_, points_, tau_, {}};
     if (auto done = polish(ground); !done) return done;
-    if (auto energy = refine_jointly(ground, found_, rounds()); !energy) return tl::unexpected(energy.error());
+    // With hundreds of thousands of points the polished models are where the joint refit would leave them.
+    if (scout_ == nullptr) {
+      if (auto energy = refine_jointly(ground, found_, kRounds); !energy) return tl::unexpected(energy.error());
+    }
     if (auto done = drop_unpaid(ground, result); !done) return done;
     for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
   }
