@@ -17,15 +17,24 @@ namespace io {
 
 cv::Mat disparity_map(const cv::Mat& left, const cv::Mat& right, int disparities) {
   const int range = (disparities + 15) / 16 * 16;
-  // SGBM leaves out the first `range` columns; a replicated border brings them in.
-  cv::Mat wide_left, wide_right;
-  cv::copyMakeBorder(left, wide_left, 0, 0, range, 0, cv::BORDER_REPLICATE);
-  cv::copyMakeBorder(right, wide_right, 0, 0, range, 0, cv::BORDER_REPLICATE);
+  // Grey finds more than colour, in half the time. SGBM leaves out the first `range` columns; a replicated border brings them in.
+  const auto widened = [range](const cv::Mat& image) {
+    cv::Mat grey, wide;
+    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+    cv::copyMakeBorder(grey, wide, 0, 0, range, 0, cv::BORDER_REPLICATE);
+    return wide;
+  };
   constexpr int kBlock = 5;
-  const auto matcher = cv::StereoSGBM::create(0, range, kBlock, 8 * 3 * kBlock * kBlock, 32 * 3 * kBlock * kBlock, 1, 31, 10, 100, 2,
-                                              cv::StereoSGBM::MODE_SGBM);
+  // Small penalties: larger ones pull slanted surfaces towards fronto-parallel steps, which tilts their planes.
+  constexpr int kSmallStep = 2 * kBlock * kBlock, kLargeStep = 24 * kBlock * kBlock;
+  constexpr int kLeftRight = 1;  // most difference of the two directions [px]
+  constexpr int kPrefilterCap = 31;
+  constexpr int kUniqueness = 10;  // the best is better than the second by this [%]
+  constexpr int kSpeckleSize = 100, kSpeckleRange = 2;
+  const auto matcher = cv::StereoSGBM::create(0, range, kBlock, kSmallStep, kLargeStep, kLeftRight, kPrefilterCap, kUniqueness,
+                                              kSpeckleSize, kSpeckleRange, cv::StereoSGBM::MODE_HH);
   cv::Mat fixed;
-  matcher->compute(wide_left, wide_right, fixed);
+  matcher->compute(widened(left), widened(right), fixed);
   cv::Mat d;
   fixed.colRange(range, fixed.cols).convertTo(d, CV_32F, 1.0 / static_cast<int>(cv::StereoMatcher::DISP_SCALE));
   d.setTo(std::numeric_limits<float>::quiet_NaN(), d < 0);
