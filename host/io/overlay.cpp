@@ -79,11 +79,11 @@ void draw_outlines(cv::Mat& image, const PerceiveResult& result) {
 }
 
 /// Text on a dark box whose lower left corner is near `at`, kept within the image. Gives the box.
-cv::Rect draw_text(cv::Mat& image, const std::string& text, cv::Point at, const cv::Scalar& colour) {
-  const double size = 0.45 * scale_of(image);
+cv::Rect draw_text(cv::Mat& image, const std::string& text, cv::Point at, const cv::Scalar& colour, double relative_size = 1) {
+  const double size = 0.45 * relative_size * scale_of(image);
   int below = 0;
   const cv::Size extent = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, size, stroke(image, 1), &below);
-  const int pad = stroke(image, 3);
+  const int pad = stroke(image, 3 * relative_size);
   cv::Rect box(at.x, at.y - extent.height - below - 2 * pad, extent.width + 2 * pad, extent.height + below + 2 * pad);
   box.x = std::clamp(box.x, 0, std::max(0, image.cols - box.width));
   box.y = std::clamp(box.y, 0, std::max(0, image.rows - box.height));
@@ -106,12 +106,14 @@ void draw_sois(cv::Mat& image, const PerceiveResult& result) {
     const auto& [x, y, width, height] = soi.bbox;
     if (width > 0 && height > 0) cv::rectangle(image, {x, y, width, height}, cv::Scalar(0, 230, 255), stroke(image, 1));
   }
+  constexpr std::size_t kCrowd = 20;
+  const double size = result.sois.size() > kCrowd ? 0.7 : 1;
   for (std::size_t k = 0; k < result.sois.size(); ++k) {  // names last, so that no rectangle crosses one
     const auto& soi = result.sois[k];
     if (soi.bbox[2] <= 0 || soi.bbox[3] <= 0) continue;
     const std::string name = soi.recognised.empty() ? "" : " " + printable(soi.recognised.front().name);
     draw_text(image, std::to_string(k + 1) + name, {soi.bbox[0], soi.bbox[1]},
-              name.empty() ? cv::Scalar::all(255) : cv::Scalar(160, 255, 160));
+              name.empty() ? cv::Scalar::all(255) : cv::Scalar(160, 255, 160), size);
   }
 }
 
@@ -132,7 +134,7 @@ void draw_legend(cv::Mat& image, const PerceiveResult& result) {
   int y = image.rows - stroke(image, 4);
   for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
     const int swatch = stroke(image, 12);
-    const cv::Rect box = draw_text(image, line->first, {stroke(image, 8) + swatch, y}, cv::Scalar::all(255));
+    const cv::Rect box = draw_text(image, line->first, {stroke(image, 8) + swatch, y}, cv::Scalar::all(255), 0.8);
     cv::rectangle(image, cv::Rect(stroke(image, 4), box.y, swatch, box.height) & cv::Rect({}, image.size()), scalar(line->second),
                   cv::FILLED);
     y = box.y - 1;
