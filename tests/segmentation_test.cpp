@@ -124,6 +124,7 @@ Grid random_grid(Random& random, int width, int height, int labels) {
     if (i % width > 0) join(i - 1);
     if (i >= width) join(i - width);
   }
+  grid.energy.close();
   return grid;
 }
 
@@ -200,6 +201,7 @@ TEST(GraphCut, KeepsToTheLabelsANodeMayTake) {
   energy.add_label(2, 0);
   energy.add_label(7, 3);
   energy.add_edge(0, 1, 100);
+  energy.close();
   auto labels = energy.cheapest();
   const PottsEnergy::Label order[] = {1, 2, 7, 9};
   EXPECT_EQ(energy.minimise(order, 5, labels), 105);

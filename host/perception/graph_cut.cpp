@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 // The graph of OpenCV's grabCut; it takes its includes from whoever includes it.
 #include <opencv2/core.hpp>
@@ -48,65 +49,91 @@ std::vector<PottsEnergy::Label> PottsEnergy::cheapest() const {
   return labels;
 }
 
+void PottsEnergy::close() {
+  takers_.clear();
+  for (std::size_t i = 0; i < nodes(); ++i)
+    for (const Choice& choice : choices(i)) takers_[choice.label].push_back({static_cast<int>(i), choice.cost});
+  first_neighbour_.assign(nodes() + 1, 0);
+  for (const Edge& e : edges_) {
+    ++first_neighbour_[static_cast<std::size_t>(e.i) + 1];
+    ++first_neighbour_[static_cast<std::size_t>(e.j) + 1];
+  }
+  std::partial_sum(first_neighbour_.begin(), first_neighbour_.end(), first_neighbour_.begin());
+  neighbours_.resize(2 * edges_.size());
+  std::vector<std::size_t> next(first_neighbour_.begin(), first_neighbour_.end() - 1);
+  for (const Edge& e : edges_) {
+    neighbours_[next[static_cast<std::size_t>(e.i)]++] = {e.j, e.weight};
+    neighbours_[next[static_cast<std::size_t>(e.j)]++] = {e.i, e.weight};
+  }
+}
+
+std::span<const PottsEnergy::Neighbour> PottsEnergy::neighbours(std::size_t node) const {
+  return std::span(neighbours_).subspan(first_neighbour_[node], first_neighbour_[node + 1] - first_neighbour_[node]);
+}
+
 PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) const {
+  const auto takers = takers_.find(alpha);
+  if (takers == takers_.end()) return 0;
   // Who may change: a vertex of the graph each. x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha.
-  std::vector<int> vertex(nodes(), -1), node;
+  std::vector<int> vertex(nodes(), -1);
+  std::vector<std::size_t> node;
   std::vector<Cost> keep, take;
-  for (std::size_t i = 0; i < nodes(); ++i) {
+  std::size_t degrees = 0;
+  for (const Taker& taker : takers->second) {
+    const auto i = static_cast<std::size_t>(taker.node);
     if (labels[i] == alpha) continue;
-    const Choice* choice = find(i, alpha);
-    if (choice == nullptr) continue;
     vertex[i] = static_cast<int>(node.size());
-    node.push_back(static_cast<int>(i));
+    node.push_back(i);
     keep.push_back(find(i, labels[i])->cost);
-    take.push_back(choice->cost);
+    take.push_back(taker.cost);
+    degrees += neighbours(i).size();
   }
   if (node.empty()) return 0;
-  const std::vector<Cost> cost_of_label = keep, cost_of_alpha = take;
+  Cost fall = 0;  // of the nodes' own costs; the edges' share follows
 
-  cv::detail::GCGraph<Cost> graph(static_cast<unsigned>(node.size()), static_cast<unsigned>(2 * edges_.size()));
+  cv::detail::GCGraph<Cost> graph(static_cast<unsigned>(node.size()), static_cast<unsigned>(degrees));
   for (std::size_t k = 0; k < node.size(); ++k) graph.addVtx();
   // Of several minimum cuts GCGraph may return a mixture that is none. A bias of one part in (vertices + 1) towards keeping leaves one cut
   // only, and it is among the least of the unbiased ones.
   const Cost scale = static_cast<Cost>(node.size()) + 1;
+  const std::vector<Cost> own_keep = keep, own_take = take;
   bool connected = false;
-  for (const Edge& e : edges_) {
-    const auto i = static_cast<std::size_t>(e.i), j = static_cast<std::size_t>(e.j);
-    const int a = vertex[i], b = vertex[j];
-    if (a < 0 && b < 0) continue;
-    if (a < 0 || b < 0) {  // the other end stands fixed
-      const auto free = static_cast<std::size_t>(a < 0 ? b : a);
-      const Label fixed = labels[a < 0 ? i : j];
-      if (labels[static_cast<std::size_t>(node[free])] != fixed) keep[free] += e.weight;
-      if (alpha != fixed) take[free] += e.weight;
-      continue;
+  for (std::size_t a = 0; a < node.size(); ++a)
+    for (const Neighbour& neighbour : neighbours(node[a])) {
+      const auto j = static_cast<std::size_t>(neighbour.node);
+      const Cost weight = neighbour.weight;
+      if (vertex[j] < 0) {  // the other end stands fixed
+        if (labels[node[a]] != labels[j]) keep[a] += weight;
+        if (alpha != labels[j]) take[a] += weight;
+        continue;
+      }
+      const auto b = static_cast<std::size_t>(vertex[j]);
+      if (b < a) continue;  // seen from the other end
+      // E(0,0) = w [l_i != l_j], E(0,1) = E(1,0) = w, E(1,1) = 0, written as terminals and one edge (Kolmogorov and Zabih 2004).
+      const Cost both_keep = labels[node[a]] != labels[j] ? weight : 0;
+      take[a] += weight - both_keep;
+      keep[b] += weight;  // -w x_b, up to a constant
+      graph.addEdges(static_cast<int>(a), static_cast<int>(b), scale * (2 * weight - both_keep), 0);
+      connected = true;
     }
-    // E(0,0) = w [l_i != l_j], E(0,1) = E(1,0) = w, E(1,1) = 0, written as terminals and one edge (Kolmogorov and Zabih 2004).
-    const Cost both_keep = labels[i] != labels[j] ? e.weight : 0;
-    take[static_cast<std::size_t>(a)] += e.weight - both_keep;
-    keep[static_cast<std::size_t>(b)] += e.weight;  // -w x_b, up to a constant
-    graph.addEdges(a, b, scale * (2 * e.weight - both_keep), 0);
-    connected = true;
-  }
-  std::vector<Label> moved = labels;
   for (std::size_t k = 0; k < node.size(); ++k) graph.addTermWeights(static_cast<int>(k), scale * take[k] + 1, scale * keep[k]);
   if (connected) graph.maxFlow();
+
+  std::vector<bool> takes(node.size());
+  for (std::size_t k = 0; k < node.size(); ++k) takes[k] = connected ? !graph.inSourceSegment(static_cast<int>(k)) : take[k] < keep[k];
   for (std::size_t k = 0; k < node.size(); ++k) {
-    const bool takes = connected ? !graph.inSourceSegment(static_cast<int>(k)) : take[k] < keep[k];
-    if (takes) moved[static_cast<std::size_t>(node[k])] = alpha;
-  }
-  Cost fall = 0;
-  for (std::size_t k = 0; k < node.size(); ++k) {
-    const auto i = static_cast<std::size_t>(node[k]);
-    if (moved[i] == alpha) fall += cost_of_label[k] - cost_of_alpha[k];
-  }
-  for (const Edge& e : edges_) {
-    const auto i = static_cast<std::size_t>(e.i), j = static_cast<std::size_t>(e.j);
-    if (labels[i] != labels[j]) fall += e.weight;
-    if (moved[i] != moved[j]) fall -= e.weight;
+    if (takes[k]) fall += own_keep[k] - own_take[k];
+    for (const Neighbour& neighbour : neighbours(node[k])) {
+      const auto j = static_cast<std::size_t>(neighbour.node);
+      if (vertex[j] >= 0 && static_cast<std::size_t>(vertex[j]) < k) continue;
+      const Label mine = takes[k] ? alpha : labels[node[k]];
+      const Label other = vertex[j] >= 0 && takes[static_cast<std::size_t>(vertex[j])] ? alpha : labels[j];
+      fall += neighbour.weight * (static_cast<int>(labels[node[k]] != labels[j]) - static_cast<int>(mine != other));
+    }
   }
   if (fall <= 0) return 0;
-  labels = std::move(moved);
+  for (std::size_t k = 0; k < node.size(); ++k)
+    if (takes[k]) labels[node[k]] = alpha;
   return fall;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,9 @@ class PottsEnergy {
   void add_label(Label label, Cost cost);
   /// weight >= 0; a weight of 0 is no edge.
   void add_edge(int i, int j, Cost weight);
+
+  /// Call once after the last add, before any expansion.
+  void close();
 
   std::size_t nodes() const noexcept { return first_.size(); }
   std::size_t edges() const noexcept { return edges_.size(); }
@@ -45,13 +49,26 @@ class PottsEnergy {
     int i, j;
     Cost weight;
   };
+  struct Neighbour {
+    int node;
+    Cost weight;
+  };
+  struct Taker {
+    int node;
+    Cost cost;
+  };
 
   std::span<const Choice> choices(std::size_t node) const;
+  std::span<const Neighbour> neighbours(std::size_t node) const;
   const Choice* find(std::size_t node, Label label) const;
 
   std::vector<std::size_t> first_;  // of each node's choices
   std::vector<Choice> choices_;
   std::vector<Edge> edges_;
+  // Made by close(): who may take a label, and each node's neighbours, so that an expansion touches only those it concerns.
+  std::map<Label, std::vector<Taker>> takers_;
+  std::vector<std::size_t> first_neighbour_;
+  std::vector<Neighbour> neighbours_;
 };
 
 }  // namespace swarmfit::perception

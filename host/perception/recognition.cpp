@@ -23,7 +23,8 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLeastInliers = 6;
 constexpr int kLargestView = 640;  // [px] larger pictures are scaled down: nothing is seen so large
 constexpr int kSmall = 128;        // [px] a proto-object smaller than this is looked at through a lens of two
-constexpr int kBorder = 24;        // [px] around a proto-object: SIFT's support beyond its outline
+constexpr int kLeastArea = 400;    // [px] smaller proto-objects have too little print to be told by
+constexpr int kBorder = 12;        // [px] around a proto-object: SIFT's support beyond its outline
 
 struct View {
   std::string name;
@@ -169,7 +170,7 @@ std::vector<std::vector<Recognition>> Gallery::recognise(const Cloud& frame, std
   for (std::size_t k = 1; k <= soi_count; ++k) {
     const cv::Mat1b mask = labels == static_cast<double>(k);
     cv::Rect box = cv::boundingRect(mask);
-    if (box.empty()) continue;
+    if (box.empty() || cv::countNonZero(mask) < kLeastArea) continue;
     box = (box - cv::Point(kBorder, kBorder) + cv::Size(2 * kBorder, 2 * kBorder)) & cv::Rect({}, grey.size());
     cv::Mat1b patch = grey(box), inside = mask(box);
     if (std::max(box.width, box.height) < kSmall + 2 * kBorder) {

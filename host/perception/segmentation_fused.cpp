@@ -63,6 +63,7 @@ class FusedCut {
     }
     find_pairs();
     build_energy();
+    energy_.close();
     std::vector<Label> cut = energy_.cheapest();
     std::vector<Label> order;
     for (const SoiRegion& region : regions_)

@@ -41,6 +41,7 @@ std::vector<PottsEnergy::Label> cut(const SegmentationInput& input, const PixelG
       if (x > 0 && y > 0) energy.add_edge(node - width - 1, node, slanted);
       if (x + 1 < width && y > 0) energy.add_edge(node - width + 1, node, slanted);
     }
+  energy.close();
   std::vector<PottsEnergy::Label> labels = energy.cheapest();
   const PottsEnergy::Label order[] = {object, background, uncertain};
   energy.minimise(order, 5, labels);
