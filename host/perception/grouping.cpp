@@ -12,7 +12,7 @@ namespace {
 constexpr double kFragmentCells = 60;    // smaller pieces are no objects of their own beside a larger one
 constexpr double kFragmentShare = 0.04;  // of the larger one's cells
 constexpr double kHollow = -0.2;         // divergence below which a piece is the inside of something
-constexpr float kRim = 0.03f;            // [m] inside and outside of a vessel are as high
+constexpr float kRim = 0.03f;            // [m] the inside of a vessel is not higher than its outside
 constexpr double kRimCells = 8;          // [cells] least border of a hollow and its shell
 constexpr int kRimReach = 5;             // [cells] holes the border may have
 constexpr double kEnclosed = 0.8;        // of a basin's border
@@ -149,7 +149,7 @@ std::map<std::pair<int, int>, double> Assembly::measure_borders() const {
   return borders;
 }
 
-/// The inside of a pot or cup goes with its outside: a hollow has a shell beside it, as high; a basin lies within its rim.
+/// The inside of a pot or cup goes with its outside: a hollow has a shell beside it, no lower; a basin lies within its rim.
 void Assembly::close_hollows() {
   while (true) {
     const auto pieces = describe();
@@ -161,7 +161,7 @@ void Assembly::close_hollows() {
     for (const auto& [pair, length] : borders) {
       if (pair.second < 0 || length <= most) continue;
       const auto &piece = pieces.at(pair.first), &other = pieces.at(pair.second);
-      const bool hollow = piece.divergence < kHollow && std::abs(piece.top - other.top) < kRim;
+      const bool hollow = piece.divergence < kHollow && piece.top < other.top + kRim;
       const bool basin = length > kEnclosed * around.at(pair.first) && piece.top < other.top - kBelowRim;
       if (!hollow && !basin) continue;
       most = length;
