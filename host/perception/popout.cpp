@@ -27,11 +27,13 @@ void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, 
     const auto& p = grid.points[i];
     if (!PointGrid::seen(p)) continue;
     float lowest = static_cast<float>(options.max_height);
+    const float range2 = p.squaredNorm();
     for (std::size_t s = 0; s < count; ++s) {
       const float h = surfaces[s].plane.height(p);
       // Within the noise of a surface counts as on it, so that a board is not taken for an object on the board below.
-      const float fringe = std::min(static_cast<float>(options.min_height), kFringeSigmas * surfaces[s].sigma(PointGrid::range(p)));
-      if (h < -fringe || h >= lowest || !surfaces[s].contains(p)) continue;
+      const float fringe = std::min(static_cast<float>(options.min_height), kFringeSigmas * surfaces[s].sigma_at(range2));
+      if (h < -fringe || h >= lowest || (count == 1 && h <= fringe)) continue;
+      if (!surfaces[s].contains(p)) continue;
       lowest = h;
       result.above[i] = h > fringe ? static_cast<std::int8_t>(s) : std::int8_t{-1};
       result.height[i] = h;

@@ -44,7 +44,8 @@ struct Surface {
     return at < 0 || extent[static_cast<std::size_t>(at)] < 2;
   }
   /// Standard deviation of a height measured at this range.
-  float sigma(float range) const noexcept { return static_cast<float>(noise) * std::max(0.25f, range * range); }
+  float sigma(float range) const noexcept { return sigma_at(range * range); }
+  float sigma_at(float range_squared) const noexcept { return static_cast<float>(noise) * std::max(0.25f, range_squared); }
 };
 
 /// `labels[i] == model` marks the plane's points. `margin` [m] widens the hull.
