@@ -20,6 +20,7 @@ struct EvaluatorOptions {
   std::function<void(std::string_view)> on_validation;  ///< called with every validation message
   std::filesystem::path pipeline_cache;   ///< folder of Vulkan pipeline caches; empty keeps none
   std::size_t max_storage_range = 0;      ///< Vulkan: pretend the device's storage-buffer range is this many bytes (tests); 0 the device's
+  bool gpu_paths = false;                 ///< Vulkan: work on a software device as on a GPU with memory of its own (tests)
 };
 
 /// One way to evaluate on this machine.

@@ -10,19 +10,29 @@ layout(constant_id = kSpecWork) const uint kWork = 8;
 
 layout(set = 0, binding = kBindPartials, std430) writeonly buffer Partials { float partials[]; };
 
+#ifndef SWARMFIT_TEXELS
 shared float sums[kTile * gl_WorkGroupSize.x];
+#endif
 
 // Eqs. (3), (4) of Zhou et al. for four points.
+#ifdef SWARMFIT_TEXELS
+// Of numbers >= 0 the smaller has the smaller bits. A software device compares these at once, where it would guard a float's min against NaN.
+vec4 loss(vec4 residuals, vec4 cap) {
+  if (kLoss == kLossL2) return uintBitsToFloat(min(floatBitsToUint(residuals * residuals), floatBitsToUint(cap * cap)));
+  return uintBitsToFloat(min(floatBitsToUint(residuals) & 0x7FFFFFFFu, floatBitsToUint(cap)));
+}
+#else
 vec4 loss(vec4 residuals, vec4 cap) {
   if (kLoss == kLossL2) return min(residuals * residuals, cap * cap);
   return min(abs(residuals), cap);
 }
+#endif
 
 void main() {
   const uint group = gl_WorkGroupSize.x;
   const uint lane = gl_LocalInvocationID.x;
   const uint chunk = gl_WorkGroupID.x;
-  const uint first = push.first_model + gl_WorkGroupID.y * kTile;
+  const uint first = gl_WorkGroupID.y * kTile;
 
   float k[kTile * kCoefficientStride];
   float sum[kTile];
@@ -46,6 +56,10 @@ void main() {
     }
   }
 
+#ifdef SWARMFIT_TEXELS
+  // Where an exchange between invocations is dearer than a few more partial sums, each leaves its own.
+  [[unroll]] for (uint t = 0; t < kTile; ++t) partials[(first + t) * push.partials + chunk * group + lane] = sum[t];
+#else
   [[unroll]] for (uint t = 0; t < kTile; ++t) sums[t * group + lane] = sum[t];
   barrier();
   for (uint half_width = group / 2; half_width > 0; half_width /= 2) {
@@ -55,5 +69,6 @@ void main() {
     }
     barrier();
   }
-  for (uint t = lane; t < kTile; t += group) partials[(first + t) * push.chunks + chunk] = sums[t * group];
+  for (uint t = lane; t < kTile; t += group) partials[(first + t) * push.partials + chunk] = sums[t * group];
+#endif
 }

@@ -1,17 +1,14 @@
 // Reading points, caps and coefficients, in two ways that give the same values.
 #ifdef SWARMFIT_TEXELS
-// A software device reads a storage buffer one invocation after another, with a branch each; a texel buffer it gathers at once.
+// A software device reads a storage buffer one invocation after another, with a branch each; a texel of four floats it
+// fetches for all of them at once.
 layout(set = 0, binding = kBindPointTexels) uniform samplerBuffer points;
 layout(set = 0, binding = kBindCapTexels) uniform samplerBuffer caps;
 layout(set = 0, binding = kBindCoefficientTexels) uniform samplerBuffer coefficients;
 
-float texel(samplerBuffer values, uint i) { return texelFetch(values, int(i)).x; }
-vec4 four_texels(samplerBuffer values, uint i) {
-  return vec4(texel(values, i), texel(values, i + 1), texel(values, i + 2), texel(values, i + 3));
-}
-#define FOUR_POINTS(i) four_texels(points, 4 * (i))
-#define FOUR_CAPS(i) four_texels(caps, 4 * (i))
-#define FOUR_COEFFICIENTS(i) four_texels(coefficients, 4 * (i))
+#define FOUR_POINTS(i) texelFetch(points, int(i))
+#define FOUR_CAPS(i) texelFetch(caps, int(i))
+#define FOUR_COEFFICIENTS(i) texelFetch(coefficients, int(i))
 #else
 layout(set = 0, binding = kBindPoints, std430) readonly buffer Points { vec4 points[]; };
 layout(set = 0, binding = kBindCaps, std430) readonly buffer Caps { vec4 caps[]; };

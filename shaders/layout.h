@@ -15,14 +15,15 @@ using uint = std::uint32_t;
 SWARMFIT_CONST kBindPoints = 0;        // column after column, `column_stride` floats each, read four points at a time
 SWARMFIT_CONST kBindCaps = 1;          // one a point; assign.comp reads tolerances here
 SWARMFIT_CONST kBindCoefficients = 2;  // kCoefficientStride floats a model
-SWARMFIT_CONST kBindPartials = 3;      // [model][chunk]; distances and labels are written here
+SWARMFIT_CONST kBindPartials = 3;      // [model][partial sum]; distances and labels are written here
 SWARMFIT_CONST kBindCosts = 4;         // [model]
 SWARMFIT_CONST kStorageBindings = 5;
-// The first three once more, as texel buffers of single floats: see fetch.glsl.
+// The first four once more, as texel buffers, four floats a texel: see fetch.glsl.
 SWARMFIT_CONST kBindPointTexels = 5;
 SWARMFIT_CONST kBindCapTexels = 6;
 SWARMFIT_CONST kBindCoefficientTexels = 7;
-SWARMFIT_CONST kBindingCount = 8;
+SWARMFIT_CONST kBindPartialTexels = 8;
+SWARMFIT_CONST kBindingCount = 9;
 
 // Specialisation constants.
 SWARMFIT_CONST kSpecGroup = 0;      // invocations in a group: the subgroup's size or a multiple of it
@@ -44,8 +45,7 @@ SWARMFIT_CONST kQuad = 4;
 
 struct Push {
   uint column_stride;  // points in a column, padding included; a multiple of kQuad
-  uint chunks;         // groups of points: the row length of the partials
-  uint first_model;    // cost: first particle of the tile row; distances, assign: unused
+  uint partials;       // partial sums of a particle: one a chunk of points, or one an invocation of a chunk
   uint models;         // assign: how many
   float tolerance;     // assign: for all points; negative where each has its own
 };

@@ -1,10 +1,22 @@
-// Second pass: one group a particle sums its chunks, each invocation with compensation (Neumaier), then a tree.
+// Second pass: one group a particle adds up its partial sums, each invocation with compensation (Knuth's two-sum), then a tree.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "layout.h"
 
 layout(local_size_x_id = kSpecGroup) in;
+#ifdef SWARMFIT_TEXELS
+layout(set = 0, binding = kBindPartialTexels) uniform samplerBuffer partials;
+#define Sum vec4
+#define PARTIAL(i) texelFetch(partials, int(i))
+const uint kWidth = 4;
+float total(vec4 four) { return (four.x + four.y) + (four.z + four.w); }
+#else
 layout(set = 0, binding = kBindPartials, std430) readonly buffer Partials { float partials[]; };
+#define Sum float
+#define PARTIAL(i) partials[i]
+const uint kWidth = 1;
+float total(float one) { return one; }
+#endif
 layout(set = 0, binding = kBindCosts, std430) writeonly buffer Costs { float costs[]; };
 layout(push_constant) uniform PushBlock { Push push; };
 
@@ -15,16 +27,18 @@ void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint particle = gl_WorkGroupID.x;
 
-  precise float sum = 0.0;
-  precise float lost = 0.0;  // what the additions rounded away
-  for (uint chunk = lane; chunk < push.chunks; chunk += group) {
-    const float value = partials[particle * push.chunks + chunk];
-    precise float next = sum + value;
-    precise float error = sum >= value ? (sum - next) + value : (value - next) + sum;
+  const uint row = push.partials / kWidth;
+  precise Sum sum = Sum(0.0);
+  precise Sum lost = Sum(0.0);  // what the additions rounded away
+  for (uint i = lane; i < row; i += group) {
+    const Sum value = PARTIAL(particle * row + i);
+    precise Sum next = sum + value;
+    precise Sum added = next - sum;
+    precise Sum error = (sum - (next - added)) + (value - added);
     lost += error;
     sum = next;
   }
-  sums[lane] = sum + lost;
+  sums[lane] = total(sum + lost);
   barrier();
   for (uint half_width = group / 2; half_width > 0; half_width /= 2) {
     if (lane < half_width) sums[lane] += sums[lane + half_width];

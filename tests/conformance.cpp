@@ -57,6 +57,9 @@ std::vector<Contender> contenders(std::string_view backend) {
   vulkan.options.validation = true;
   vulkan.options.on_validation = [](std::string_view message) { validation_messages().emplace_back(message); };
   all.push_back(vulkan);
+  vulkan.name = "vulkan_gpu_paths";  // what a GPU runs, on whatever device there is
+  vulkan.options.gpu_paths = true;
+  all.push_back(vulkan);
   if (!backend.empty()) std::erase_if(all, [&](const Contender& contender) { return contender.backend != backend; });
   return all;
 }

@@ -25,7 +25,7 @@ class Buffer {
 
   std::size_t bytes() const noexcept { return bytes_; }
   vk::Buffer handle() const noexcept { return *buffer_; }
-  /// All of it as a texel buffer of floats; null where the device does not read through texels.
+  /// All of it as a texel buffer, four floats a texel; null where the device does not read through texels.
   vk::BufferView texels() const noexcept { return *texels_; }
   /// Persistently mapped, coherent; null where the host cannot see it.
   void* mapped() const noexcept { return mapped_; }

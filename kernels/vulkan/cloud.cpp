@@ -44,6 +44,7 @@ Result<> Cloud::set(const PointsView& points, Extent extent) {
     segment.count = static_cast<std::uint32_t>(std::min(limit, extent_.finite_count - segment.first));
     segment.chunks = (segment.count + shape_.points() - 1) / shape_.points();
     segment.stride = segment.chunks * shape_.points();
+    segment.sums = segment.chunks * shape_.sums;
     segment.points.reserve(device_, sizeof(float) * static_cast<std::size_t>(points.dimension) * segment.stride, Residence::device);
     segment.caps.reserve(device_, sizeof(float) * segment.stride, Residence::device);
     write_columns(segment, points);

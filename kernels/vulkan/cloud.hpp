@@ -14,9 +14,10 @@ struct Segment {
   std::uint32_t count = 0;   ///< finite points
   std::uint32_t stride = 0;  ///< points in a column: count, padded to whole chunks with points of cap 0
   std::uint32_t chunks = 0;
+  std::uint32_t sums = 0;    ///< partial sums of a particle
   Buffer points;
   Buffer caps;
-  Buffer partials;   ///< [particle][chunk]
+  Buffer partials;   ///< [particle][partial sum]
   Buffer tolerance;  ///< like caps; made when assign first needs it
   Buffer output;     ///< distances or labels; made when first needed
 };

@@ -53,11 +53,11 @@ void Commands::make_sets() {
 
 std::size_t Commands::swarm_limit() const {
   const DeviceTraits& traits = device_.traits();
-  std::size_t chunks = 0;
-  for (const Segment& segment : cloud_->segments()) chunks += segment.chunks;
-  const std::size_t largest = cloud_->segments().empty() ? 1 : cloud_->segments().front().chunks;
+  std::size_t sums = 0;
+  for (const Segment& segment : cloud_->segments()) sums += segment.sums;
+  const std::size_t largest = cloud_->segments().empty() ? 1 : cloud_->segments().front().sums;
   std::size_t limit = std::min(traits.storage_range / kModelBytes, traits.storage_range / (sizeof(float) * largest));
-  limit = std::min(limit, kPartialsLimit / (sizeof(float) * std::max<std::size_t>(chunks, 1)));
+  limit = std::min(limit, kPartialsLimit / (sizeof(float) * std::max<std::size_t>(sums, 1)));
   limit = std::min<std::size_t>({limit, traits.grid_limit[0], traits.grid_limit[1]});
   const std::size_t tile = largest_tile(traits);
   return std::max(limit / tile, std::size_t{1}) * tile;
@@ -76,7 +76,7 @@ void Commands::reserve_particles(std::uint32_t particles) {
   cost_stride_ = (particles + kRowFloats - 1) / kRowFloats * kRowFloats;
   costs_.reserve(device_, sizeof(float) * cost_stride_ * cloud_->segments().size(), Residence::readback);
   for (Segment& segment : cloud_->segments()) {
-    segment.partials.reserve(device_, sizeof(float) * particles * segment.chunks, Residence::device);
+    segment.partials.reserve(device_, sizeof(float) * particles * segment.sums, Residence::device);
   }
   room_ = particles;
   bind_costs();
@@ -106,7 +106,7 @@ void Commands::bind_set(vk::DescriptorSet set, const Segment& segment, const Buf
                                                          {out.handle(), 0, VK_WHOLE_SIZE}}};
   device_.handle().updateDescriptorSets(vk::WriteDescriptorSet(set, layout::kBindPoints, 0, vk::DescriptorType::eStorageBuffer, {}, buffers), {});
   if (!device_.traits().texels) return;
-  const std::array views{segment.points.texels(), caps.texels(), coefficients_.texels()};
+  const std::array views{segment.points.texels(), caps.texels(), coefficients_.texels(), out.texels()};
   device_.handle().updateDescriptorSets(
       vk::WriteDescriptorSet(set, layout::kBindPointTexels, 0, vk::DescriptorType::eUniformTexelBuffer, {}, {}, views), {});
 }
@@ -124,7 +124,7 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
   const auto each_segment = [&](std::uint32_t x, std::uint32_t y) {
     for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
       const Segment& segment = cloud_->segments()[s];
-      const layout::Push push{segment.stride, segment.chunks, 0, 0, 0};
+      const layout::Push push{segment.stride, segment.sums, 0, 0};
       commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
       commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
       commands.dispatch(x > 0 ? x : segment.chunks, y, 1);
@@ -180,7 +180,7 @@ void Commands::run_map(const Specialisation& wanted, std::size_t models, float t
   once_.bindPipeline(vk::PipelineBindPoint::eCompute, pipelines_.get(wanted));
   for (std::size_t s = 0; s < map_sets_.size(); ++s) {
     const Segment& segment = cloud_->segments()[s];
-    const layout::Push push{segment.stride, segment.chunks, 0, static_cast<std::uint32_t>(models), tolerance};
+    const layout::Push push{segment.stride, segment.sums, static_cast<std::uint32_t>(models), tolerance};
     once_.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *map_sets_[s], {});
     once_.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
     once_.dispatch((segment.stride / layout::kQuad + wanted.group - 1) / wanted.group, 1, 1);

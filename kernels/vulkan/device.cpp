@@ -8,19 +8,20 @@
 namespace swarmfit::kernels::vulkan {
 namespace {
 
-DeviceTraits traits_of(const vk::raii::PhysicalDevice& physical, std::size_t max_storage_range) {
+DeviceTraits traits_of(const vk::raii::PhysicalDevice& physical, const EvaluatorOptions& options) {
   const auto chain = physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties,
                                              vk::PhysicalDeviceMaintenance3Properties>();
   const vk::PhysicalDeviceProperties& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
   DeviceTraits traits;
   traits.name = properties.deviceName.data();
-  traits.software = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+  traits.software = properties.deviceType == vk::PhysicalDeviceType::eCpu && !options.gpu_paths;
+  traits.staging = options.gpu_paths;
   traits.texels = traits.software;
   traits.storage_range = properties.limits.maxStorageBufferRange;
   if (traits.texels) {
-    traits.storage_range = std::min(traits.storage_range, std::size_t{properties.limits.maxTexelBufferElements} * sizeof(float));
+    traits.storage_range = std::min(traits.storage_range, std::size_t{properties.limits.maxTexelBufferElements} * 4 * sizeof(float));
   }
-  if (max_storage_range > 0) traits.storage_range = std::min(traits.storage_range, max_storage_range);
+  if (options.max_storage_range > 0) traits.storage_range = std::min(traits.storage_range, options.max_storage_range);
   traits.allocation_limit = chain.get<vk::PhysicalDeviceMaintenance3Properties>().maxMemoryAllocationSize;
   traits.subgroup = chain.get<vk::PhysicalDeviceSubgroupProperties>().subgroupSize;
   traits.group_limit = std::min(properties.limits.maxComputeWorkGroupInvocations, properties.limits.maxComputeWorkGroupSize[0]);
@@ -43,9 +44,9 @@ vk::raii::Device create(const vk::raii::PhysicalDevice& physical, std::uint32_t 
 
 }  // namespace
 
-Device::Device(const vk::raii::PhysicalDevice& physical, std::size_t max_storage_range)
+Device::Device(const vk::raii::PhysicalDevice& physical, const EvaluatorOptions& options)
     : physical_(&physical),
-      traits_(traits_of(physical, max_storage_range)),
+      traits_(traits_of(physical, options)),
       memory_(physical.getMemoryProperties()),
       family_(static_cast<std::uint32_t>(compute_family(physical))),
       device_(create(physical, family_)),

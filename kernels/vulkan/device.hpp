@@ -12,6 +12,7 @@ struct DeviceTraits {
   std::string name;
   bool software = false;             ///< shaders run on this machine's CPU
   bool texels = false;               ///< reads faster through texel buffers than through storage buffers
+  bool staging = false;              ///< device memory is filled through copies even where the host could see it
   std::size_t storage_range = 0;     ///< largest bytes of one storage buffer's binding
   std::size_t allocation_limit = 0;  ///< largest bytes of one allocation
   std::size_t memory = 0;            ///< bytes of the largest device-local heap
@@ -23,8 +24,8 @@ struct DeviceTraits {
 
 class Device {
  public:
-  /// Throws std::exception. `max_storage_range` 0 means the device's own.
-  Device(const vk::raii::PhysicalDevice& physical, std::size_t max_storage_range);
+  /// Throws std::exception.
+  Device(const vk::raii::PhysicalDevice& physical, const EvaluatorOptions& options);
 
   const DeviceTraits& traits() const noexcept { return traits_; }
   const vk::raii::PhysicalDevice& physical() const noexcept { return *physical_; }

@@ -17,6 +17,7 @@ namespace {
 #include "embedded/distances.h"
 #include "embedded/distances_texels.h"
 #include "embedded/reduce.h"
+#include "embedded/reduce_texels.h"
 #include "embedded/shader_models.h"
 
 using Spirv = std::span<const std::uint32_t>;
@@ -24,7 +25,7 @@ using Spirv = std::span<const std::uint32_t>;
 Spirv spirv(Shader shader, bool texels) {
   switch (shader) {
     case Shader::cost: return texels ? Spirv(cost_texels_spirv) : Spirv(cost_spirv);
-    case Shader::reduce: return reduce_spirv;
+    case Shader::reduce: return texels ? Spirv(reduce_texels_spirv) : Spirv(reduce_spirv);
     case Shader::distances: return texels ? Spirv(distances_texels_spirv) : Spirv(distances_spirv);
     case Shader::assign: break;
   }

@@ -23,6 +23,7 @@ ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimen
   const std::size_t work = points / (wanted_chunks * shape.group * 4);
   shape.work = static_cast<std::uint32_t>(std::bit_floor(std::clamp<std::size_t>(work, 1, most_work)));
   const std::size_t columns = device.storage_range / (sizeof(float) * static_cast<std::size_t>(dimension));
+  shape.sums = device.texels ? shape.group : 1;
   while (shape.work > 1 && shape.points() > columns) shape.work /= 2;
   return shape;
 }

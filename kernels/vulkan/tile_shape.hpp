@@ -11,6 +11,7 @@ namespace swarmfit::kernels::vulkan {
 struct ChunkShape {
   std::uint32_t group = 0;  ///< invocations in a group
   std::uint32_t work = 0;   ///< quads an invocation goes through
+  std::uint32_t sums = 0;   ///< partial sums a group leaves of each particle
   std::uint32_t points() const noexcept { return group * work * 4; }
 };
 ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimension);

@@ -22,7 +22,7 @@ class VulkanEvaluator final : public FitnessEvaluator {
   VulkanEvaluator(Instance instance, vk::raii::PhysicalDevice physical, const EvaluatorOptions& options)
       : instance_(std::move(instance)),
         physical_(std::move(physical)),
-        device_(physical_, options.max_storage_range),
+        device_(physical_, options),
         pipelines_(device_, options.pipeline_cache),
         cloud_(device_),
         commands_(device_, pipelines_),
