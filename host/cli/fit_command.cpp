@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 struct FitArguments {
   std::string model, input, normal, within;
+  VerticalFlags vertical;
   FitFlags fit;
   OutputFlags output;
   CameraFlags camera;
@@ -32,17 +33,27 @@ bool is_png(const std::string& file) {
   return extension == ".png" || extension == ".PNG";
 }
 
-/// --normal and --within: models within an angle of a direction.
+/// --normal or the vertical, and --within: models within an angle of a direction.
 Expected<> apply_prior(const FitArguments& arguments, FitOptions& options) {
   const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
-  if (arguments.normal.empty() && arguments.within.empty()) return {};
-  if (arguments.normal.empty()) return invalid("--within needs --normal, the direction it is measured from");
+  const bool vertical = arguments.vertical.given();
+  if (arguments.normal.empty() && arguments.within.empty() && !vertical) return {};
+  if (arguments.normal.empty() && !vertical) return invalid("--within needs --normal, the direction it is measured from");
+  if (!arguments.normal.empty() && vertical) return invalid("--normal excludes --gravity and --camera-tilt");
+  if (vertical && options.model != ModelType::plane)
+    return invalid(fmt::format("--gravity and --camera-tilt are for horizontal planes, not for {}", arguments.model));
   const std::size_t columns = options.model == ModelType::line2d ? 2 : 3;
-  const auto normal = parse_list("--normal", arguments.normal, columns == 2 ? "X,Y" : "X,Y,Z", columns);
-  if (!normal) return tl::unexpected(normal.error());
   DirectionPrior prior;
-  prior.axis = Eigen::Vector3d((*normal)[0], (*normal)[1], columns == 2 ? 0 : (*normal)[2]);
-  if (!(prior.axis.norm() > 0)) return invalid(fmt::format("--normal: {}, must not be zero", arguments.normal));
+  if (vertical) {
+    const auto axis = arguments.vertical.axis();
+    if (!axis) return tl::unexpected(axis.error());
+    prior.axis = *axis;
+  } else {
+    const auto normal = parse_list("--normal", arguments.normal, columns == 2 ? "X,Y" : "X,Y,Z", columns);
+    if (!normal) return tl::unexpected(normal.error());
+    prior.axis = Eigen::Vector3d((*normal)[0], (*normal)[1], columns == 2 ? 0 : (*normal)[2]);
+    if (!(prior.axis.norm() > 0)) return invalid(fmt::format("--normal: {}, must not be zero", arguments.normal));
+  }
   if (!arguments.within.empty()) {
     const auto degrees = parse_number(arguments.within);
     if (!degrees || !(*degrees > 0 && *degrees <= 90))
@@ -142,6 +153,7 @@ Command add_fit(CLI::App& app) {
       ->type_name("X,Y,Z")
       ->group("How models are found");
   sub->add_option("--within", arguments->within, "How near: within this angle [11.5]")->type_name("DEG")->group("How models are found");
+  arguments->vertical.add_to(*sub, "How models are found", "with it or --gravity, only planes that are level");
   arguments->fit.add_to(*sub);
   arguments->camera.add_to(*sub);
   arguments->output.add_to(*sub, "A folder for result.json and labels.txt");

@@ -152,20 +152,14 @@ Expected<> OutputFlags::check() const {
   return {};
 }
 
-void SceneFlags::add_to(CLI::App& app) {
-  const char* group = "What is known of the scene";
+void VerticalFlags::add_to(CLI::App& app, const std::string& group, const std::string& with_neither) {
   app.add_option("--gravity", gravity, "Direction of gravity in the camera's frame (x right, y down, z forward)")
       ->type_name("X,Y,Z")
       ->group(group);
-  app.add_option("--camera-tilt", camera_tilt, "The camera looks down by this much; with neither, the dominant plane is the ground")
-      ->type_name("DEG")
-      ->group(group);
-  app.add_option("--gallery", gallery, "Names for what is found: one image, or one folder of images, a name")
-      ->type_name("DIR")
-      ->group(group);
+  app.add_option("--camera-tilt", camera_tilt, "The camera looks down by this much; " + with_neither)->type_name("DEG")->group(group);
 }
 
-Expected<> SceneFlags::apply(PerceiveOptions& options) const {
+Expected<> VerticalFlags::apply(PerceiveOptions& options) const {
   if (!gravity.empty() && !camera_tilt.empty()) return invalid("--gravity and --camera-tilt exclude each other");
   if (!gravity.empty()) {
     const auto g = parse_list("--gravity", gravity, "X,Y,Z", 3);
@@ -178,6 +172,26 @@ Expected<> SceneFlags::apply(PerceiveOptions& options) const {
     if (!tilt || !(std::abs(*tilt) <= 90)) return invalid(fmt::format("--camera-tilt: {}, must be in -90..90 [degrees]", camera_tilt));
     options.camera_tilt = *tilt * std::numbers::pi / 180;
   }
+  return {};
+}
+
+Expected<Eigen::Vector3d> VerticalFlags::axis() const {
+  PerceiveOptions parsed;
+  if (auto ok = apply(parsed); !ok) return tl::unexpected(ok.error());
+  if (parsed.gravity) return *parsed.gravity;
+  return Eigen::Vector3d(0, std::cos(*parsed.camera_tilt), std::sin(*parsed.camera_tilt));
+}
+
+void SceneFlags::add_to(CLI::App& app) {
+  const char* group = "What is known of the scene";
+  vertical.add_to(app, group, "with neither, the dominant plane is the ground");
+  app.add_option("--gallery", gallery, "Names for what is found: one image, or one folder of images, a name")
+      ->type_name("DIR")
+      ->group(group);
+}
+
+Expected<> SceneFlags::apply(PerceiveOptions& options) const {
+  if (auto ok = vertical.apply(options); !ok) return ok;
   options.gallery = gallery;
   return options.validate();
 }

@@ -41,9 +41,22 @@ struct OutputFlags {
   Expected<> check() const;
 };
 
+/// Which way is up: given to fit, perceive and demo.
+struct VerticalFlags {
+  std::string gravity, camera_tilt;
+
+  void add_to(CLI::App& app, const std::string& group, const std::string& with_neither);
+  bool given() const noexcept { return !gravity.empty() || !camera_tilt.empty(); }
+  /// Into gravity or camera_tilt of `options`. Fails with invalid_option.
+  Expected<> apply(PerceiveOptions& options) const;
+  /// The vertical's direction, in the camera's frame. Only where given.
+  Expected<Eigen::Vector3d> axis() const;
+};
+
 /// Which way is up, and what is known by name: given to perceive and demo.
 struct SceneFlags {
-  std::string gravity, camera_tilt, gallery;
+  VerticalFlags vertical;
+  std::string gallery;
 
   void add_to(CLI::App& app);
   Expected<> apply(PerceiveOptions& options) const;
