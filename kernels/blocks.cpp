@@ -10,9 +10,9 @@
 namespace swarmfit::kernels {
 namespace {
 
-constexpr int kDigitBits = 12;
+constexpr int kDigitBits = 8;
 constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
-constexpr int kPasses = 2;
+constexpr int kPasses = 3;
 constexpr std::size_t kLeastChunk = 16384;
 constexpr std::size_t kMostChunks = 64;
 constexpr std::size_t kSample = 1024;
@@ -92,7 +92,7 @@ std::span<const std::uint32_t> MortonOrder::sort(std::span<const float* const> c
     widest = std::max(widest, static_cast<double>(to) - static_cast<double>(from));
   }
 
-  // Cells are cubes; two digits hold the key of a cell.
+  // Cells are cubes; the digits together hold the key of a cell.
   const int bits = kPasses * kDigitBits / static_cast<int>(dimensions);
   const double cells = static_cast<double>((std::size_t{1} << bits) - 1);
   const auto scale = static_cast<float>(widest > 0 ? cells / widest : 0.0);
@@ -138,62 +138,95 @@ std::span<const std::uint32_t> MortonOrder::sort(std::span<const float* const> c
   return order_;
 }
 
+namespace {
+
+/// A block's points about their mean, in columns; weight 1 where there is a cap, else 0 and at the mean.
+struct Centred {
+  alignas(64) std::array<std::array<float, kBlockPoints>, 3> offset{};
+  alignas(64) std::array<float, kBlockPoints> weight{};
+};
+
+/// Fills all that needs no axes. The loops here are plain so that compilers turn them into vectors.
+void centre_block(const float* const* columns, const float* caps, std::size_t width, Centred& centred, BlockBounds& bounds) {
+  constexpr float kNone = std::numeric_limits<float>::max();
+  float count = 0, cap_sum = 0, least = kNone, most = 0;
+#pragma omp simd reduction(+ : count, cap_sum) reduction(min : least) reduction(max : most)
+  for (std::size_t i = 0; i < kBlockPoints; ++i) {
+    const float weight = caps[i] > 0 ? 1.0F : 0.0F;
+    const float low = caps[i] > 0 ? caps[i] : kNone;
+    centred.weight[i] = weight;
+    count += weight;
+    cap_sum += caps[i];
+    least = least < low ? least : low;
+    most = most > caps[i] ? most : caps[i];
+  }
+  bounds.count = count;
+  if (count == 0) return;
+  bounds.cap_sum = cap_sum;
+  bounds.least_cap = least;
+  bounds.most_cap = most;
+  for (std::size_t c = 0; c < width; ++c) {
+    const float* column = columns[c];
+    const float* weight = centred.weight.data();
+    float* offset = centred.offset[c].data();
+    float sum = 0;
+#pragma omp simd reduction(+ : sum)
+    for (std::size_t i = 0; i < kBlockPoints; ++i) sum += weight[i] * column[i];
+    const float mean = bounds.mean[c] = sum / count;
+#pragma omp simd
+    for (std::size_t i = 0; i < kBlockPoints; ++i) offset[i] = weight[i] * (column[i] - mean);
+  }
+}
+
+float dot(const float* a, const float* b) {
+  float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t i = 0; i < kBlockPoints; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+/// The box and the signed sums along one axis, of unit length.
+void bound_axis(const Centred& centred, const std::array<float, 3>& axis, double variance, std::size_t width, std::size_t e,
+                BlockBounds& bounds) {
+  alignas(64) std::array<float, kBlockPoints> sign;
+  const float *x = centred.offset[0].data(), *y = centred.offset[1].data(), *z = centred.offset[2].data();
+  float reach = 0, signs = 0;
+#pragma omp simd reduction(+ : signs) reduction(max : reach)
+  for (std::size_t i = 0; i < kBlockPoints; ++i) {
+    const float along = axis[0] * x[i] + axis[1] * y[i] + axis[2] * z[i];
+    const float size = std::abs(along);
+    reach = reach > size ? reach : size;
+    sign[i] = std::copysign(centred.weight[i], along);
+    signs += sign[i];
+  }
+  for (std::size_t c = 0; c < width; ++c) {
+    bounds.axis[e][c] = axis[c] * reach;
+    bounds.signed_offset[e][c] = dot(sign.data(), centred.offset[c].data());
+  }
+  const double square = static_cast<double>(reach) * static_cast<double>(reach);
+  bounds.spread[e] = square > 0 ? static_cast<float>(std::max(0.0, variance) / square) : 0.0F;
+  bounds.sign_sum[e] = signs;
+}
+
+}  // namespace
+
 BlockBounds bound_block(const float* const* columns, const float* caps, int dimension) {
   const auto width = static_cast<std::size_t>(dimension);
   BlockBounds bounds;
-  std::array<double, 3> mean{};
-  double n = 0, cap_sum = 0;
-  float least = std::numeric_limits<float>::infinity();
-  for (std::size_t i = 0; i < kBlockPoints; ++i) {
-    if (!(caps[i] > 0)) continue;
-    n += 1;
-    cap_sum += static_cast<double>(caps[i]);
-    least = std::min(least, caps[i]);
-    bounds.most_cap = std::max(bounds.most_cap, caps[i]);
-    for (std::size_t c = 0; c < width; ++c) mean[c] += static_cast<double>(columns[c][i]);
-  }
-  if (n == 0) return bounds;
-  bounds.count = static_cast<float>(n);
-  bounds.least_cap = least;
-  bounds.cap_sum = static_cast<float>(cap_sum);
-  for (std::size_t c = 0; c < width; ++c) {
-    bounds.mean[c] = static_cast<float>(mean[c] / n);
-    mean[c] = static_cast<double>(bounds.mean[c]);
-  }
-
+  Centred centred;
+  centre_block(columns, caps, width, centred, bounds);
+  if (bounds.count == 0) return bounds;
   std::array<std::array<double, 3>, 3> covariance{}, axes{};
-  for (std::size_t i = 0; i < kBlockPoints; ++i) {
-    if (!(caps[i] > 0)) continue;
-    for (std::size_t a = 0; a < width; ++a) {
-      for (std::size_t b = 0; b <= a; ++b) {
-        covariance[a][b] += (static_cast<double>(columns[a][i]) - mean[a]) * (static_cast<double>(columns[b][i]) - mean[b]);
-      }
-    }
-  }
   for (std::size_t a = 0; a < width; ++a) {
-    for (std::size_t b = 0; b <= a; ++b) covariance[a][b] = covariance[b][a] = covariance[a][b] / n;
+    for (std::size_t b = 0; b <= a; ++b) {
+      const float sum = dot(centred.offset[a].data(), centred.offset[b].data());
+      covariance[a][b] = covariance[b][a] = static_cast<double>(sum) / static_cast<double>(bounds.count);
+    }
   }
   diagonalise(covariance, axes, dimension);
-
-  std::array<double, 3> reach{};
-  std::array<std::array<double, 3>, BlockBounds::kSigns> offset{};
-  std::array<double, BlockBounds::kSigns> signs{};
-  for (std::size_t i = 0; i < kBlockPoints; ++i) {
-    if (!(caps[i] > 0)) continue;
-    for (std::size_t e = 0; e < width; ++e) {
-      double along = 0;
-      for (std::size_t c = 0; c < width; ++c) along += axes[c][e] * (static_cast<double>(columns[c][i]) - mean[c]);
-      reach[e] = std::max(reach[e], std::abs(along));
-      const double sign = along < 0 ? -1.0 : 1.0;
-      signs[e] += sign;
-      for (std::size_t c = 0; c < width; ++c) offset[e][c] += sign * (static_cast<double>(columns[c][i]) - mean[c]);
-    }
-  }
   for (std::size_t e = 0; e < width; ++e) {
-    for (std::size_t c = 0; c < width; ++c) bounds.axis[e][c] = static_cast<float>(axes[c][e] * reach[e]);
-    bounds.spread[e] = static_cast<float>(reach[e] > 0 ? std::max(0.0, covariance[e][e]) / (reach[e] * reach[e]) : 0.0);
-    for (std::size_t c = 0; c < width; ++c) bounds.signed_offset[e][c] = static_cast<float>(offset[e][c]);
-    bounds.sign_sum[e] = static_cast<float>(signs[e]);
+    const std::array<float, 3> axis{static_cast<float>(axes[0][e]), static_cast<float>(axes[1][e]), static_cast<float>(axes[2][e])};
+    bound_axis(centred, axis, covariance[e][e], width, e, bounds);
   }
   return bounds;
 }

@@ -31,11 +31,15 @@ struct VectorMath {
   static HWY_INLINE Vector set(double value) { return hn::Set(FloatTag(), static_cast<float>(value)); }
 };
 
-/// The lesser of |d| and a cap >= 0, or the cap where d is NaN. Floats without a sign order as their bits do, and integer minima leave
-/// the multiply-add units alone.
-HWY_INLINE Vector least(Vector magnitude, Vector cap) {
+/// The lesser of a magnitude and a limit >= 0, or the limit where the magnitude is NaN.
+HWY_INLINE Vector least(Vector magnitude, Vector limit) {
+#if HWY_ARCH_X86
+  return hn::Min(magnitude, limit);  // gives its second operand where one is NaN, and leaves the multiply-add units alone
+#else
+  // Floats without a sign order as their bits do, NaN above all.
   const BitsTag bits;
-  return hn::BitCast(FloatTag(), hn::Min(hn::BitCast(bits, magnitude), hn::BitCast(bits, cap)));
+  return hn::BitCast(FloatTag(), hn::Min(hn::BitCast(bits, magnitude), hn::BitCast(bits, limit)));
+#endif
 }
 
 template <Loss loss>
