@@ -16,7 +16,7 @@ shared float sums[kTile * gl_WorkGroupSize.x];
 
 // Eqs. (3), (4) of Zhou et al. for four points.
 #ifdef SWARMFIT_TEXELS
-// Of numbers >= 0 the smaller has the smaller bits. A software device compares these at once, where it would guard a float's min against NaN.
+// Of numbers >= 0 the smaller has the smaller bits. A software device compares these at once; a float min it would guard against NaN.
 vec4 loss(vec4 residuals, vec4 cap) {
   if (kLoss == kLossL2) return uintBitsToFloat(min(floatBitsToUint(residuals * residuals), floatBitsToUint(cap * cap)));
   return uintBitsToFloat(min(floatBitsToUint(residuals) & 0x7FFFFFFFu, floatBitsToUint(cap)));
