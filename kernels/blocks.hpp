@@ -30,11 +30,11 @@ class MortonOrder {
 /// its rounding by the user. Axes are the principal ones, so that a patch of a plane has a flat box.
 struct BlockBounds {
   static constexpr int kSigns = 3;
-  float count = 0;                                    ///< points with a cap > 0
+  float count = 0;  ///< points with a cap > 0
   float mean[3] = {};
-  float axis[3][3] = {};                              ///< principal axes, each as long as the box's half extent about the mean
-  float spread[3] = {};                               ///< variance along the axis over the square of its length
-  float least_cap = 0;                                ///< of caps > 0
+  float axis[3][3] = {};  ///< principal axes, each as long as the box's half extent about the mean
+  float spread[3] = {};   ///< variance along the axis over the square of its length
+  float least_cap = 0;    ///< of caps > 0
   float most_cap = -std::numeric_limits<float>::infinity();
   float cap_sum = 0;
   /// For signs s_i of +1 and -1, |sum s_i d_i| <= sum |d_i|: sum s_i (x_i - mean) and sum s_i. The signs are those of the points'

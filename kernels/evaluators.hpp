@@ -13,23 +13,23 @@
 namespace swarmfit::kernels {
 
 struct EvaluatorOptions {
-  int threads = 0;                        ///< worker threads of the CPU back end; 0 takes all
-  std::string simd;                       ///< CPU instruction set by name ("scalar", "AVX2", ...); empty takes the best
-  bool pruning = true;                    ///< leave out what provably changes no cost; the costs are the same either way
-  bool validation = false;                ///< Vulkan validation layers with synchronisation validation
+  int threads = 0;                                      ///< worker threads of the CPU back end; 0 takes all
+  std::string simd;                                     ///< CPU instruction set by name ("scalar", "AVX2", ...); empty takes the best
+  bool pruning = true;                                  ///< leave out what provably changes no cost; the costs are the same either way
+  bool validation = false;                              ///< Vulkan validation layers with synchronisation validation
   std::function<void(std::string_view)> on_validation;  ///< called with every validation message
-  std::filesystem::path pipeline_cache;   ///< folder of Vulkan pipeline caches; empty keeps none
-  std::size_t max_storage_range = 0;      ///< Vulkan: pretend the device's storage-buffer range is this many bytes (tests); 0 the device's
-  bool gpu_paths = false;                 ///< Vulkan: work on a software device as on a GPU with memory of its own (tests)
+  std::filesystem::path pipeline_cache;                 ///< folder of Vulkan pipeline caches; empty keeps none
+  std::size_t max_storage_range = 0;  ///< Vulkan: pretend the device's storage-buffer range is this many bytes (tests); 0 the device's
+  bool gpu_paths = false;             ///< Vulkan: work on a software device as on a GPU with memory of its own (tests)
 };
 
 /// One way to evaluate on this machine.
 struct DeviceDescription {
-  std::string backend;   ///< "reference", "cpu", "vulkan"
-  std::string device;    ///< name as accepted by make_evaluator
-  std::string kind;      ///< "cpu", "discrete GPU", "integrated GPU", "software"
+  std::string backend;  ///< "reference", "cpu", "vulkan"
+  std::string device;   ///< name as accepted by make_evaluator
+  std::string kind;     ///< "cpu", "discrete GPU", "integrated GPU", "software"
   bool usable = false;
-  std::string reason;    ///< why not, or what `auto` thinks of it
+  std::string reason;  ///< why not, or what `auto` thinks of it
   std::vector<std::pair<std::string, std::string>> limits;
 };
 
@@ -37,7 +37,7 @@ std::vector<DeviceDescription> list_devices();
 
 struct Selection {
   std::unique_ptr<FitnessEvaluator> evaluator;
-  std::string reason;    ///< why this one, for the result
+  std::string reason;  ///< why this one, for the result
 };
 
 /// `name`: auto, cpu, vulkan, reference, or (part of) a device's name as listed. Fails with `unavailable` or `invalid`.

@@ -61,9 +61,9 @@ struct Identity {
 
 /// Work done since set_points.
 struct Effort {
-  std::uint64_t evaluations = 0;     ///< models asked for
-  std::uint64_t point_models = 0;    ///< finite points x models asked for
-  std::uint64_t touched = 0;         ///< of these, how many residuals were really computed
+  std::uint64_t evaluations = 0;   ///< models asked for
+  std::uint64_t point_models = 0;  ///< finite points x models asked for
+  std::uint64_t touched = 0;       ///< of these, how many residuals were really computed
 };
 
 /// Not thread-safe: one thread at a time may call. All spans belong to the caller and are read or written only within the call.

@@ -13,9 +13,9 @@ enum class Scalar { float32, float64 };
 struct PointsView {
   const void* data = nullptr;
   Scalar scalar = Scalar::float32;
-  int dimension = 0;      ///< columns: 2 (x, y), 3 (x, y, z) or 4 (x1, y1, x2, y2)
-  std::size_t count = 0;  ///< rows
-  std::size_t stride = 0; ///< bytes from a row to the next
+  int dimension = 0;       ///< columns: 2 (x, y), 3 (x, y, z) or 4 (x1, y1, x2, y2)
+  std::size_t count = 0;   ///< rows
+  std::size_t stride = 0;  ///< bytes from a row to the next
 
   double at(std::size_t row, int column) const noexcept {
     const char* p = static_cast<const char*>(data) + row * stride;

@@ -10,10 +10,10 @@ namespace swarmfit::kernels {
 
 struct Failure {
   enum class Kind {
-    invalid,         ///< an argument is out of its bounds: field, value and bound are in the message
-    unavailable,     ///< the back end or device asked for cannot be used
-    out_of_memory,   ///< host or device memory does not hold the workload
-    device,          ///< the device failed while working
+    invalid,        ///< an argument is out of its bounds: field, value and bound are in the message
+    unavailable,    ///< the back end or device asked for cannot be used
+    out_of_memory,  ///< host or device memory does not hold the workload
+    device,         ///< the device failed while working
   };
   Kind kind = Kind::invalid;
   std::string message;

@@ -92,9 +92,11 @@ void expect_absent(const std::vector<std::string_view>& folders, const std::vect
 }
 
 TEST(Architecture, TheReaderOfSourcesSeesWhatIsThere) {
-  EXPECT_EQ(includes_of("#pragma once\n#include <a/b.hpp>\n  # include \"c.h\"\n// #include <no>\n"), (std::vector<std::string>{"a/b.hpp", "c.h"}));
+  EXPECT_EQ(includes_of("#pragma once\n#include <a/b.hpp>\n  # include \"c.h\"\n// #include <no>\n"),
+            (std::vector<std::string>{"a/b.hpp", "c.h"}));
   EXPECT_EQ(code_of("a; // printf(\nb = \"printf(\"; /* printf( */ c;"), "a;  \nb =  ;   c;");
-  const auto fit = std::find_if(sources().begin(), sources().end(), [](const SourceFile& f) { return f.path == "host/include/swarmfit/fit.hpp"; });
+  const auto fit =
+      std::find_if(sources().begin(), sources().end(), [](const SourceFile& f) { return f.path == "host/include/swarmfit/fit.hpp"; });
   ASSERT_NE(fit, sources().end());
   EXPECT_NE(std::find(fit->includes.begin(), fit->includes.end(), "swarmfit/model.hpp"), fit->includes.end());
 }
@@ -112,7 +114,8 @@ TEST(Architecture, ShadersIncludeOnlyShaders) {
 
 TEST(Architecture, OnlyKernelsKnowDevices) {
   expect_includes({"host/", "samples/"}, {}, [](std::string_view include) {
-    return !starts_with_any(include, {"vulkan", "glslang", "SPIRV", "spirv", "tbb/", "oneapi/", "hwy/", "immintrin", "x86intrin", "arm_neon"});
+    return !starts_with_any(include,
+                            {"vulkan", "glslang", "SPIRV", "spirv", "tbb/", "oneapi/", "hwy/", "immintrin", "x86intrin", "arm_neon"});
   });
 }
 
@@ -137,13 +140,15 @@ TEST(Architecture, TheCommandUsesInstalledHeaders) {
 }
 
 TEST(Architecture, SamplesUseInstalledHeaders) {
-  expect_includes({"samples/"}, {},
-                  [](std::string_view include) { return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/"}); });
+  expect_includes({"samples/"}, {}, [](std::string_view include) {
+    return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/"});
+  });
 }
 
 TEST(Architecture, OnlyTestsAndBenchesKnowTheirFrameworks) {
-  expect_includes({""}, {"tests/", "bench/"},
-                  [](std::string_view include) { return !starts_with_any(include, {"gtest/", "gmock/", "benchmark/", "tests/", "bench/"}); });
+  expect_includes({""}, {"tests/", "bench/"}, [](std::string_view include) {
+    return !starts_with_any(include, {"gtest/", "gmock/", "benchmark/", "tests/", "bench/"});
+  });
 }
 
 TEST(Architecture, NothingBelowTheCommandPrintsExitsOrReadsTheEnvironment) {

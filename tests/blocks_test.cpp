@@ -148,8 +148,8 @@ TEST_P(Pruning, CostsBelowTheirCutoffsAreTheSameBytes) {
     asked += pruned->effort().point_models;
     EXPECT_EQ(brute->effort().touched, brute->effort().point_models);
   }
-  EXPECT_GT(lost, 100U);           // the cutoffs did settle models early
-  EXPECT_LT(touched, asked / 4 * 3);   // and blocks were left out
+  EXPECT_GT(lost, 100U);              // the cutoffs did settle models early
+  EXPECT_LT(touched, asked / 4 * 3);  // and blocks were left out
 }
 
 TEST_P(Pruning, SameBytesOnAnyThreadsAndEachInstructionSet) {
@@ -266,7 +266,8 @@ TEST(BlockBounds, HoldEveryPointWithACap) {
         for (std::size_t i = 0; i < kBlockPoints; ++i) {
           if (caps[i] == 0) continue;
           double along = 0;
-          for (int c = 0; c < dimension; ++c) along += double{bounds.axis[e][c]} * (double{columns[static_cast<std::size_t>(c)][i]} - double{bounds.mean[c]});
+          for (int c = 0; c < dimension; ++c)
+            along += double{bounds.axis[e][c]} * (double{columns[static_cast<std::size_t>(c)][i]} - double{bounds.mean[c]});
           EXPECT_LE(std::abs(along), square * (1 + 1e-5));
         }
       }

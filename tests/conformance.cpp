@@ -49,7 +49,8 @@ std::vector<Contender> contenders(std::string_view backend) {
   std::vector<Contender> all{{"reference", "reference", {}}};
   for (const cpu::CpuKernels* kernels : cpu::available_kernels()) {
     Contender contender{std::string("cpu_") + kernels->name, "cpu", {}};
-    std::replace_if(contender.name.begin(), contender.name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
+    std::replace_if(
+        contender.name.begin(), contender.name.end(), [](unsigned char c) { return !std::isalnum(c); }, '_');
     contender.options.simd = kernels->name;
     all.push_back(contender);
   }

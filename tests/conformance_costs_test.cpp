@@ -23,7 +23,8 @@ TEST_P(Costs, AgreeOnAllSizes) {
         // Not worth the time: the oracle against itself, and what a GPU runs where there may be none.
         const bool slow = GetParam().backend == "reference" || GetParam().options.gpu_paths;
         if (slow && points * particles > 5000000) continue;
-        SCOPED_TRACE(std::string(traits(kind).name) + ", " + std::to_string(points) + " points, " + std::to_string(particles) + " particles");
+        SCOPED_TRACE(std::string(traits(kind).name) + ", " + std::to_string(points) + " points, " + std::to_string(particles) +
+                     " particles");
         for (const Loss loss : kLosses) {
           // All of a small product, else enough particles to meet first, last and inner tiles.
           const std::size_t compared = points * particles <= 200000 ? particles : points > 100000 ? 5 : 12;

@@ -110,9 +110,9 @@ TEST_P(Labels, TiesGoToTheLowerNumber) {
   const Cloud cloud = make_cloud(ModelKind::plane, 1000);
   load(cloud);
   const std::vector<double> one = make_swarm(ModelKind::plane, 1);
-  std::vector<double> swarm{0, 0, 1, 1000};                          // near nothing
+  std::vector<double> swarm{0, 0, 1, 1000};  // near nothing
   for (int copy = 0; copy < 3; ++copy) swarm.insert(swarm.end(), one.begin(), one.end());
-  for (const double v : one) swarm.push_back(-v);                    // the same plane, the other way round
+  for (const double v : one) swarm.push_back(-v);  // the same plane, the other way round
   const std::vector<std::uint16_t> found = labels(views(ModelKind::plane, swarm), std::vector<float>{kInf}, 1000);
   EXPECT_EQ(std::count(found.begin(), found.end(), 2), 1000);
 }

@@ -83,7 +83,8 @@ inline Rendering render_table(const std::vector<Box>& boxes, double noise = 0.00
         }
       const double z = nearest + jitter(random) * nearest * nearest;
       out.truth.push_back(what);
-      for (const double value : {x * z, y * z, z}) out.cloud.values32.push_back(what == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value));
+      for (const double value : {x * z, y * z, z})
+        out.cloud.values32.push_back(what == 0 ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(value));
     }
   return out;
 }

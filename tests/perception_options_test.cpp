@@ -26,7 +26,8 @@ TEST(PerceiveOptions, EachFieldHasABound) {
     change(options);
     return options;
   };
-  for (const double bad : {0.0, -1.0, nan, 1.6}) expect_invalid(with([&](auto& o) { o.horizontal_angle = bad; }), "horizontal_angle", "(0, pi/2)");
+  for (const double bad : {0.0, -1.0, nan, 1.6})
+    expect_invalid(with([&](auto& o) { o.horizontal_angle = bad; }), "horizontal_angle", "(0, pi/2)");
   for (const double bad : {0.0, 1.0, nan}) expect_invalid(with([&](auto& o) { o.min_plane_share = bad; }), "min_plane_share", "(0, 1)");
   for (const double bad : {0.0, -1.0, nan, inf}) expect_invalid(with([&](auto& o) { o.min_height = bad; }), "min_height", "> 0");
   for (const double bad : {0.005, nan, inf}) expect_invalid(with([&](auto& o) { o.max_height = bad; }), "max_height", "> min_height");

@@ -11,7 +11,8 @@
 namespace swarmfit {
 namespace {
 
-const std::vector<test::Box> kBoxes{{{-0.3, 0, 0.08}, {0.08, 0.06, 0.08}}, {{0.2, 0.05, 0.05}, {0.12, 0.1, 0.05}, 0.3}, {{0.2, 0.05, 0.14}, {0.05, 0.05, 0.04}, 0.9}};
+const std::vector<test::Box> kBoxes{
+    {{-0.3, 0, 0.08}, {0.08, 0.06, 0.08}}, {{0.2, 0.05, 0.05}, {0.12, 0.1, 0.05}, 0.3}, {{0.2, 0.05, 0.14}, {0.05, 0.05, 0.04}, 0.9}};
 
 PerceiveOptions on_cpu() {
   PerceiveOptions options;
@@ -107,7 +108,8 @@ TEST(Perceiver, GravityAndTilt) {
   const auto sideways = perceive(test::render_table({}).cloud, options);
   ASSERT_TRUE(sideways) << sideways.error().message;
   EXPECT_TRUE(sideways->fit.models.empty());
-  EXPECT_EQ(std::count(sideways->fit.labels.begin(), sideways->fit.labels.end(), 0), static_cast<std::ptrdiff_t>(sideways->fit.labels.size()));
+  EXPECT_EQ(std::count(sideways->fit.labels.begin(), sideways->fit.labels.end(), 0),
+            static_cast<std::ptrdiff_t>(sideways->fit.labels.size()));
 }
 
 TEST(Perceiver, ThreadsDoNotChangeTheAnswer) {

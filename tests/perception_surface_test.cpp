@@ -11,7 +11,7 @@ TEST(Surface, MeasuresATablesExtentAndNoise) {
   const auto grid = make_grid(scene.cloud);
   const auto surface = make_surface(grid, scene.table_labels(), 1, scene.table(), 0.02);
   EXPECT_NEAR(measure_noise(grid, scene.table_labels(), surface), 0.002 * 0.6, 0.0006);  // along the normal, not along the ray
-  EXPECT_NEAR(surface.area, 1.85, 0.15);            // the camera sees most of 1.92 square metres
+  EXPECT_NEAR(surface.area, 1.85, 0.15);                                                 // the camera sees most of 1.92 square metres
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (scene.truth[i] == 1) {
       ASSERT_TRUE(surface.contains(grid.points[i])) << i;
@@ -34,7 +34,8 @@ TEST(Surface, ABoxTopIsToldFromTheTable) {
   const auto grid = make_grid(scene.cloud);
   std::vector<std::uint16_t> top(scene.truth.size(), 0);
   const auto table = scene.table();
-  for (std::size_t i = 0; i < top.size(); ++i) top[i] = scene.truth[i] == 2 && std::abs(table.height(grid.points[i]) - 0.2f) < 0.008f ? 2 : 0;
+  for (std::size_t i = 0; i < top.size(); ++i)
+    top[i] = scene.truth[i] == 2 && std::abs(table.height(grid.points[i]) - 0.2f) < 0.008f ? 2 : 0;
   const std::vector<Surface> surfaces{make_surface(grid, top, 2, {table.normal, table.offset - 0.2f}, 0.02),
                                       make_surface(grid, scene.table_labels(), 1, table, 0.02)};
   ASSERT_GT(surfaces[0].area, 0.02);
@@ -48,7 +49,8 @@ TEST(Surface, ATableAboveAFloorSupports) {
   const auto grid = make_grid(scene.cloud);
   std::vector<std::uint16_t> top(scene.truth.size(), 0);
   const auto floor = scene.table();
-  for (std::size_t i = 0; i < top.size(); ++i) top[i] = scene.truth[i] == 2 && std::abs(floor.height(grid.points[i]) - 0.4f) < 0.01f ? 2 : 0;
+  for (std::size_t i = 0; i < top.size(); ++i)
+    top[i] = scene.truth[i] == 2 && std::abs(floor.height(grid.points[i]) - 0.4f) < 0.01f ? 2 : 0;
   const std::vector<Surface> surfaces{make_surface(grid, scene.table_labels(), 1, floor, 0.02),
                                       make_surface(grid, top, 2, {floor.normal, floor.offset - 0.4f}, 0.02)};
   EXPECT_EQ(choose_supporting(surfaces, 0.6), (std::vector<bool>{true, true}));

@@ -212,7 +212,8 @@ TEST(Deflation, ReachFollowsATailAndStopsAtAnEvenBackground) {
       for (int b = 0; b < 40; ++b) (std::erf((low + high) / 2 / std::numbers::sqrt2) < (k + 0.5) / 5000 ? low : high) = (low + high) / 2;
       distances.push_back(static_cast<float>(sigma * low));
     }
-    for (std::size_t k = 0; k < background; ++k) distances.push_back(static_cast<float>(10.0 * static_cast<double>(k) / static_cast<double>(background)));
+    for (std::size_t k = 0; k < background; ++k)
+      distances.push_back(static_cast<float>(10.0 * static_cast<double>(k) / static_cast<double>(background)));
     const std::vector<float> ones(distances.size(), 1.0F);
     return tail_reach(distances, ones, ones);
   };

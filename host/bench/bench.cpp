@@ -129,8 +129,8 @@ class Bench {
 
   Expected<> run(const Case& what, const std::string& backend, bool pruning) {
     const kernels::ModelTraits& traits = kernels::traits(what.kind);
-    const std::string title =
-        fmt::format("{} {} {} points x {} particles{}", backend, traits.name, what.points.size(), what.particles, pruning ? ", pruning" : "");
+    const std::string title = fmt::format("{} {} {} points x {} particles{}", backend, traits.name, what.points.size(), what.particles,
+                                          pruning ? ", pruning" : "");
     auto made = make(backend, options_.threads, pruning);
     if (!made) return tl::unexpected(made.error());
     kernels::FitnessEvaluator& evaluator = *made->evaluator;
@@ -147,8 +147,8 @@ class Bench {
     const auto error = replay.error();
     if (!error) return tl::unexpected(error.error());
     if (!(*error <= kernels::kCostTolerance)) {
-      return fail(Error::Kind::backend_unavailable, fmt::format("{}: the costs are off the reference by {:.2g}, must be <= {:.2g}", title, *error,
-                                                                kernels::kCostTolerance));
+      return fail(Error::Kind::backend_unavailable,
+                  fmt::format("{}: the costs are off the reference by {:.2g}, must be <= {:.2g}", title, *error, kernels::kCostTolerance));
     }
     const auto seconds = replay.time(options_.seconds);
     if (!seconds) return tl::unexpected(seconds.error());
@@ -224,8 +224,8 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
   for (const ModelType type : types) {
     if (cloud) {
       if (cloud->dimension() != dimension(type)) {
-        return fail(Error::Kind::bad_input, fmt::format("points have {} columns, must have {} to bench a {}", cloud->dimension(),
-                                                        dimension(type), name(type)));
+        return fail(Error::Kind::bad_input,
+                    fmt::format("points have {} columns, must have {} to bench a {}", cloud->dimension(), dimension(type), name(type)));
       }
       if (auto done = run_cloud(runner, options, type, *cloud, backends); !done) return tl::unexpected(done.error());
       continue;

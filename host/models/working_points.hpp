@@ -42,9 +42,7 @@ class WorkingPoints {
   /// Dimension of the smallest flat that holds all finite points (to float precision): 0 a point, 1 a line, 2 a plane ...
   int rank() const noexcept { return rank_; }
   const kernels::PointsView& view() const noexcept { return view_; }
-  double at(std::size_t i, int d) const noexcept {
-    return (view_.at(i, d) - frame_.centre[static_cast<std::size_t>(d)]) / frame_.scale;
-  }
+  double at(std::size_t i, int d) const noexcept { return (view_.at(i, d) - frame_.centre[static_cast<std::size_t>(d)]) / frame_.scale; }
   template <int D>
   Eigen::Matrix<double, D, 1> point(std::size_t i) const noexcept {
     Eigen::Matrix<double, D, 1> p;
@@ -65,8 +63,8 @@ class WorkingPoints {
 
  private:
   template <class T, int D>
-  void accumulate_as(std::span<const std::uint32_t> index, std::span<const double> weight, double& total,
-                     Eigen::Matrix<double, D, 1>& sum, Eigen::Matrix<double, D, D>& square) const {
+  void accumulate_as(std::span<const std::uint32_t> index, std::span<const double> weight, double& total, Eigen::Matrix<double, D, 1>& sum,
+                     Eigen::Matrix<double, D, D>& square) const {
     double w_all = 0, first[D] = {}, second[D][D] = {};
     for (std::size_t k = 0; k < index.size(); ++k) {
       T row[D];
@@ -95,8 +93,8 @@ class WorkingPoints {
   Frame frame_;
   std::size_t finite_count_ = 0;
   int rank_ = 0;
-  std::vector<std::uint8_t> finite_;   // empty: all are
-  std::vector<std::uint32_t> index_;   // empty: the identity
+  std::vector<std::uint8_t> finite_;  // empty: all are
+  std::vector<std::uint32_t> index_;  // empty: the identity
 };
 
 }  // namespace swarmfit::models

@@ -14,8 +14,8 @@ constexpr double kCrease = 0.52;       // [rad] a concave edge that counts in fu
 constexpr double kCreaseWeight = 1.5;  // against 1 of a convex edge: two things touch along short borders
 constexpr double kStepWeight = 0.5;
 constexpr double kStepSigmas = 4;
-constexpr int kReach = 6;              // [cells] holes between patches may be this wide
-constexpr float kNear = 0.035f;        // [m] patches this near are neighbours, though they say nothing of each other
+constexpr int kReach = 6;        // [cells] holes between patches may be this wide
+constexpr float kNear = 0.035f;  // [m] patches this near are neighbours, though they say nothing of each other
 
 /// The place at most `most` cells inside the patch at (u, v), in the direction (du, dv).
 std::size_t step_inside(const CoarseGrid& coarse, const Patches& patches, int u, int v, int du, int dv, int most) {

@@ -12,9 +12,9 @@
 namespace swarmfit::perception {
 
 struct GroupingOptions {
-  double flood_step = 0.02;                                ///< [m]
-  double noise = 0.0015;                                   ///< standard deviation of a depth at a range of one metre [m]
-  Eigen::Vector3f up = Eigen::Vector3f::UnitZ();           ///< against gravity
+  double flood_step = 0.02;                       ///< [m]
+  double noise = 0.0015;                          ///< standard deviation of a depth at a range of one metre [m]
+  Eigen::Vector3f up = Eigen::Vector3f::UnitZ();  ///< against gravity
 };
 
 struct Contact {

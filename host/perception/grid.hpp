@@ -14,11 +14,11 @@
 namespace swarmfit::perception {
 
 struct PointGrid {
-  int width = 0, height = 0;                          ///< height 1: no image grid
-  std::vector<Eigen::Vector3f> points;                ///< relative to `origin`; NaN where the sensor saw nothing
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();   ///< not zero only where the coordinates are too large for single precision
+  int width = 0, height = 0;                         ///< height 1: no image grid
+  std::vector<Eigen::Vector3f> points;               ///< relative to `origin`; NaN where the sensor saw nothing
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< not zero only where the coordinates are too large for single precision
   std::size_t finite = 0;
-  float pitch = 0;                                    ///< angle between neighbouring pixels [rad]; unorganised: 0
+  float pitch = 0;  ///< angle between neighbouring pixels [rad]; unorganised: 0
 
   bool organised() const noexcept { return height > 1; }
   std::size_t size() const noexcept { return points.size(); }

@@ -9,19 +9,19 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr double kFragmentCells = 60;    // smaller pieces are no objects of their own beside a larger one
-constexpr double kFragmentShare = 0.04;  // of the larger one's cells
-constexpr double kHollow = -0.2;         // divergence below which a piece is the inside of something
-constexpr float kRim = 0.03f;            // [m] the inside of a vessel is not higher than its outside
-constexpr double kRimCells = 8;          // [cells] least border of a hollow and its shell
-constexpr int kRimReach = 5;             // [cells] holes the border may have
-constexpr double kEnclosed = 0.8;        // of a basin's border
-constexpr float kBelowRim = 0.01f;       // [m] a basin's top is at least this far below that of what encloses it
-constexpr float kSameSurface = 0.978f;   // cosine of 12 degrees
-constexpr float kOffSurface = 0.012f;    // [m]
-constexpr float kBridge = 0.35f;         // [m] between the middles of two pieces of one surface
-constexpr std::size_t kBridgeCells = 25; // smaller patches do not tell their surface
-constexpr float kInFront = 0.005f;       // [m]
+constexpr double kFragmentCells = 60;     // smaller pieces are no objects of their own beside a larger one
+constexpr double kFragmentShare = 0.04;   // of the larger one's cells
+constexpr double kHollow = -0.2;          // divergence below which a piece is the inside of something
+constexpr float kRim = 0.03f;             // [m] the inside of a vessel is not higher than its outside
+constexpr double kRimCells = 8;           // [cells] least border of a hollow and its shell
+constexpr int kRimReach = 5;              // [cells] holes the border may have
+constexpr double kEnclosed = 0.8;         // of a basin's border
+constexpr float kBelowRim = 0.01f;        // [m] a basin's top is at least this far below that of what encloses it
+constexpr float kSameSurface = 0.978f;    // cosine of 12 degrees
+constexpr float kOffSurface = 0.012f;     // [m]
+constexpr float kBridge = 0.35f;          // [m] between the middles of two pieces of one surface
+constexpr std::size_t kBridgeCells = 25;  // smaller patches do not tell their surface
+constexpr float kInFront = 0.005f;        // [m]
 
 /// What a piece looks like as a whole.
 struct Piece {

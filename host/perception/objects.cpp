@@ -9,9 +9,9 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr double kIslandShare = 0.9;    // of an island's border that one object holds
-constexpr int kIslandReach = 5;         // [cells] holes between an island and what encloses it
-constexpr int kIslandCells = 12;        // smaller ones are noise
+constexpr double kIslandShare = 0.9;  // of an island's border that one object holds
+constexpr int kIslandReach = 5;       // [cells] holes between an island and what encloses it
+constexpr int kIslandCells = 12;      // smaller ones are noise
 
 /// Object of the nearest cell around the point's own, in space; among cells of the point's group.
 std::uint16_t nearest_object(const CoarseGrid& coarse, const std::vector<std::uint16_t>& object, const Eigen::Vector3f& p,
@@ -80,7 +80,8 @@ Thumbnail shrink(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
   thumb.height = grid.height / thumb.stride;
   for (int v = 0; v < thumb.height; ++v)
     for (int u = 0; u < thumb.width; ++u) {
-      const auto i = static_cast<std::size_t>(v * thumb.stride) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u * thumb.stride);
+      const auto i =
+          static_cast<std::size_t>(v * thumb.stride) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u * thumb.stride);
       thumb.object.push_back(objects.of_point[i]);
       thumb.support.push_back(objects.of_point[i] == 0 && on_support[i] != 0);
     }

@@ -11,7 +11,7 @@ namespace {
 constexpr int kCoarseWidth = 320;
 constexpr int kBaseline = 4;         // [cells] over which a normal is taken
 constexpr float kBlockReach = 4.0f;  // points of a block are within this many footprints of its first: no mean across a depth edge
-constexpr int kEdgeReach = 2;         // [px]
+constexpr int kEdgeReach = 2;        // [px]
 constexpr int kEdge = 15;            // sum of the three channels: below is noise
 constexpr float kBend = 0.3f;        // of the baseline's length: farther off its middle the surface bends
 
@@ -44,11 +44,13 @@ void average_blocks(const PointGrid& grid, Overview& overview) {
 /// From differences across the cell both ways; zero unless the cell lies amid them.
 Eigen::Vector3f normal_at(const PointGrid& cells, int u, int v) {
   const auto at = [&](int x, int y) -> const Eigen::Vector3f& { return cells.points[static_cast<std::size_t>(y * cells.width + x)]; };
-  const auto &here = at(u, v), &left = at(u - kBaseline, v), &right = at(u + kBaseline, v), &above = at(u, v - kBaseline), &below = at(u, v + kBaseline);
+  const auto &here = at(u, v), &left = at(u - kBaseline, v), &right = at(u + kBaseline, v), &above = at(u, v - kBaseline),
+             &below = at(u, v + kBaseline);
   const Eigen::Vector3f across = right - left, along = below - above;
   const float bend_across = (right + left - 2 * here).squaredNorm(), bend_along = (below + above - 2 * here).squaredNorm();
   // NaN fails these as well.
-  if (!(bend_across < kBend * kBend * across.squaredNorm() && bend_along < kBend * kBend * along.squaredNorm())) return Eigen::Vector3f::Zero();
+  if (!(bend_across < kBend * kBend * across.squaredNorm() && bend_along < kBend * kBend * along.squaredNorm()))
+    return Eigen::Vector3f::Zero();
   Eigen::Vector3f normal = across.cross(along);
   const float length = normal.norm();
   if (!(length > 0)) return Eigen::Vector3f::Zero();

@@ -13,11 +13,11 @@ namespace swarmfit::perception {
 
 /// `cells` is itself a grid, of block means; unorganised: the points themselves, and no normals.
 struct Overview {
-  int stride = 1;                        ///< [px] a cell is a block of stride x stride
+  int stride = 1;  ///< [px] a cell is a block of stride x stride
   PointGrid cells;
   std::vector<Eigen::Vector3f> normals;  ///< unit, towards the camera; zero where the surface bends, ends or is unknown; empty: none known
 
-  std::vector<std::uint8_t> textured;    ///< passive stereo: 1 where there was something to match; empty: the depth is good everywhere
+  std::vector<std::uint8_t> textured;  ///< passive stereo: 1 where there was something to match; empty: the depth is good everywhere
 
   bool has_normals() const noexcept { return !normals.empty(); }
   /// Whether the surface at a cell may belong to a plane with this normal (n and -n are one). True where nothing is known at all.

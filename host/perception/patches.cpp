@@ -8,12 +8,12 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr int kCoarseWidth = 320;       // [cells] fine enough for a cup's handle, coarse enough for a few milliseconds
-constexpr int kNormalRadius = 3;        // [cells]
-constexpr float kNormalReach = 2.2f;    // neighbours are within this many footprints times the radius: slanted faces are stretched
+constexpr int kCoarseWidth = 320;     // [cells] fine enough for a cup's handle, coarse enough for a few milliseconds
+constexpr int kNormalRadius = 3;      // [cells]
+constexpr float kNormalReach = 2.2f;  // neighbours are within this many footprints times the radius: slanted faces are stretched
 constexpr std::size_t kFewNeighbours = 6;
-constexpr float kSameFace = 0.93f;      // cosine between a cell's normal and its patch's mean: 21.6 degrees
-constexpr std::size_t kSmallPatch = 12; // [cells]
+constexpr float kSameFace = 0.93f;       // cosine between a cell's normal and its patch's mean: 21.6 degrees
+constexpr std::size_t kSmallPatch = 12;  // [cells]
 
 void average_blocks(const PointGrid& grid, const Popout& popout, CoarseGrid& coarse) {
   for (int cv = 0; cv < coarse.height; ++cv)
@@ -68,7 +68,8 @@ void estimate_normal(CoarseGrid& coarse, int cu, int cv, float pitch) {
 }
 
 /// Breadth first from `seed`, over cells whose normal agrees with the patch's.
-void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, float pitch, Patches& patches, std::vector<std::uint32_t>& queue) {
+void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, float pitch, Patches& patches,
+              std::vector<std::uint32_t>& queue) {
   queue.assign(1, static_cast<std::uint32_t>(seed));
   patches.label[seed] = mark;
   Eigen::Vector3f sum = coarse.normals[seed], mean = sum;

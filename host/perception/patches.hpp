@@ -12,10 +12,10 @@ namespace swarmfit::perception {
 /// One cell a block of stride x stride pixels; cells without a group hold NaN and group 0.
 struct CoarseGrid {
   int stride = 1, width = 0, height = 0;
-  std::vector<Eigen::Vector3f> points;    ///< mean of the block's points of one group
-  std::vector<Eigen::Vector3f> normals;   ///< unit, towards the camera; zero where there are too few neighbours
-  std::vector<float> variation;           ///< least eigenvalue over the sum, of the neighbourhood
-  std::vector<std::uint16_t> group;       ///< pop-out group
+  std::vector<Eigen::Vector3f> points;   ///< mean of the block's points of one group
+  std::vector<Eigen::Vector3f> normals;  ///< unit, towards the camera; zero where there are too few neighbours
+  std::vector<float> variation;          ///< least eigenvalue over the sum, of the neighbourhood
+  std::vector<std::uint16_t> group;      ///< pop-out group
   float footprint(std::size_t at, float pitch) const { return static_cast<float>(stride) * pitch * points[at].norm(); }
 };
 

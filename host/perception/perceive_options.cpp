@@ -20,8 +20,7 @@ bool positive(double v) { return v > 0 && std::isfinite(v); }
 
 Expected<> check_gravity(const Eigen::Vector3d& g) {
   if (g.allFinite() && g.norm() > 0) return {};
-  return fail(Error::Kind::invalid_option,
-              fmt::format("gravity is ({}, {}, {}), must be finite and not zero", g.x(), g.y(), g.z()));
+  return fail(Error::Kind::invalid_option, fmt::format("gravity is ({}, {}, {}), must be finite and not zero", g.x(), g.y(), g.z()));
 }
 
 }  // namespace

@@ -70,7 +70,8 @@ struct Perceiver::State {
   Expected<> make_free_fitter();
   Expected<> make_support_fitter();
   Expected<> suit_sensor(const Cloud& frame);
-  Expected<> find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop, PerceiveResult& result);
+  Expected<> find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
+                           PerceiveResult& result);
   void find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const;
 };
 
@@ -174,7 +175,8 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   PerceiveResult result;
   if (auto ok = state_->suit_sensor(frame); !ok) return tl::unexpected(ok.error());
   const auto grid = perception::make_grid(frame);
-  if (grid.finite < 3) return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= 3 to perceive", grid.finite, frame.size()));
+  if (grid.finite < 3)
+    return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= 3 to perceive", grid.finite, frame.size()));
   const auto overview = perception::make_overview(grid, frame);
   if (auto ok = state_->find_vertical(grid, overview, stop, result); !ok) return tl::unexpected(ok.error());
   result.vertical_source = state_->vertical ? state_->vertical->source : "dominant plane";

@@ -6,13 +6,13 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr double kNormalSlack = 0.35;   // [rad] normals of cells are noisy
-constexpr float kAlong = 0.9f;          // cosine: a cell whose normal is farther off does not lie in the plane
-constexpr double kAgreement = 0.5;      // share of a plane's cells that lie along it; less is clutter cut by a slab
-constexpr double kContrast = 2;         // of the density in a surface to that around it
-constexpr std::size_t kFewCells = 10;   // fewer flat cells hold no surface
-constexpr float kFringeOfPlane = 0.06f; // [m] a surface reaches this far beyond the cells that tell its direction
-constexpr double kExtentMargin = 0.02;  // [m] things stand a little over the edge of what is seen of a table
+constexpr double kNormalSlack = 0.35;    // [rad] normals of cells are noisy
+constexpr float kAlong = 0.9f;           // cosine: a cell whose normal is farther off does not lie in the plane
+constexpr double kAgreement = 0.5;       // share of a plane's cells that lie along it; less is clutter cut by a slab
+constexpr double kContrast = 2;          // of the density in a surface to that around it
+constexpr std::size_t kFewCells = 10;    // fewer flat cells hold no surface
+constexpr float kFringeOfPlane = 0.06f;  // [m] a surface reaches this far beyond the cells that tell its direction
+constexpr double kExtentMargin = 0.02;   // [m] things stand a little over the edge of what is seen of a table
 
 /// The cells as a cloud for the fitter.
 std::vector<float> gather(const Overview& overview, const std::vector<std::uint32_t>& chosen) {
@@ -60,8 +60,8 @@ FitResult nothing(const Fitter& fitter, std::size_t points) {
 }
 
 /// Labels of the cells: the nearest of the planes, where the cell lies along it.
-std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vector<std::uint32_t>& flat, const std::vector<LocalPlane>& planes,
-                                       float tau) {
+std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vector<std::uint32_t>& flat,
+                                       const std::vector<LocalPlane>& planes, float tau) {
   std::vector<std::uint16_t> labels(overview.cells.size(), 0);
   for (const auto i : flat) {
     float nearest = tau;
@@ -82,7 +82,8 @@ Surface grow_surface(const Overview& overview, const std::vector<std::uint16_t>&
   auto wider = labels;
   for (std::size_t i = 0; i < wider.size(); ++i) {
     const auto& p = overview.cells.points[i];
-    if (PointGrid::seen(p) && std::abs(plane.height(p)) <= tau && core.near_component(p, kFringeOfPlane)) wider[i] = static_cast<std::uint16_t>(model);
+    if (PointGrid::seen(p) && std::abs(plane.height(p)) <= tau && core.near_component(p, kFringeOfPlane))
+      wider[i] = static_cast<std::uint16_t>(model);
   }
   return make_surface(overview.cells, wider, model, plane, kExtentMargin);
 }

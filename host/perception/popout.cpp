@@ -57,8 +57,8 @@ class GridFlood {
   bool is_seed(std::size_t i) const {
     if (result_.above[i] < 0) return false;
     const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[i])];
-    return result_.height[i] >= std::max(static_cast<float>(options_.min_height),
-                                         kSeedSigmas * surface.sigma(PointGrid::range(grid_.points[i])));
+    return result_.height[i] >=
+           std::max(static_cast<float>(options_.min_height), kSeedSigmas * surface.sigma(PointGrid::range(grid_.points[i])));
   }
 
   /// Members of the group of `seed`, marked with `mark`.
@@ -75,7 +75,8 @@ class GridFlood {
 
  private:
   void spread(std::size_t at, std::uint16_t mark) {
-    const int u = static_cast<int>(at % static_cast<std::size_t>(grid_.width)), v = static_cast<int>(at / static_cast<std::size_t>(grid_.width));
+    const int u = static_cast<int>(at % static_cast<std::size_t>(grid_.width)),
+              v = static_cast<int>(at / static_cast<std::size_t>(grid_.width));
     const auto& p = grid_.points[at];
     const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[at])];
     const float step = flood_step_at(grid_, surface.noise, options_.flood_step, PointGrid::range(p));
@@ -142,9 +143,7 @@ class VoxelFlood {
     }
     points.resize(kept);
   }
-  Eigen::Vector3i cell(const Eigen::Vector3f& p) const {
-    return (p / step_).array().floor().max(-1e6f).min(1e6f).cast<int>();
-  }
+  Eigen::Vector3i cell(const Eigen::Vector3f& p) const { return (p / step_).array().floor().max(-1e6f).min(1e6f).cast<int>(); }
   static std::uint64_t key(const Eigen::Vector3i& c) {
     const auto part = [](int v) { return static_cast<std::uint64_t>(v + 1048576) & 0x1fffffu; };
     return part(c.x()) << 42 | part(c.y()) << 21 | part(c.z());
@@ -177,7 +176,8 @@ bool is_structure(const PointGrid& grid, const Surface& surface, const Popout& r
                   const PopoutOptions& options) {
   const auto ceiling = static_cast<float>(options.max_height);
   if (!grid.organised()) {
-    const auto high = std::count_if(members.begin(), members.end(), [&](std::uint32_t i) { return result.height[i] > kNearCeiling * ceiling; });
+    const auto high =
+        std::count_if(members.begin(), members.end(), [&](std::uint32_t i) { return result.height[i] > kNearCeiling * ceiling; });
     return static_cast<double>(high) > kCutShare * static_cast<double>(members.size());
   }
   std::size_t cut = 0;
@@ -186,7 +186,8 @@ bool is_structure(const PointGrid& grid, const Surface& surface, const Popout& r
     if (result.height[i] < kNearCeiling * ceiling) continue;
     const float step = flood_step_at(grid, surface.noise, options.flood_step, PointGrid::range(grid.points[i]));
     const auto goes_on = [&](std::size_t to) {
-      return to < grid.size() && surface.plane.height(grid.points[to]) >= ceiling && (grid.points[to] - grid.points[i]).squaredNorm() <= step * step;
+      return to < grid.size() && surface.plane.height(grid.points[to]) >= ceiling &&
+             (grid.points[to] - grid.points[i]).squaredNorm() <= step * step;
     };
     cut += goes_on(i - width) || goes_on(i + width) || goes_on(i - 1) || goes_on(i + 1) ? 1 : 0;
   }

@@ -11,18 +11,18 @@
 namespace swarmfit::perception {
 
 struct PopoutOptions {
-  double min_height = 0.008;       ///< [m]
-  double max_height = 0.6;         ///< [m]
-  double flood_step = 0.02;        ///< [m]
-  std::size_t min_points = 300;    ///< of a group, at the cloud's own resolution
+  double min_height = 0.008;     ///< [m]
+  double max_height = 0.6;       ///< [m]
+  double flood_step = 0.02;      ///< [m]
+  std::size_t min_points = 300;  ///< of a group, at the cloud's own resolution
 };
 
 struct Popout {
-  std::vector<std::uint16_t> group;    ///< one a point: 0, or k for the k-th group
-  std::vector<int> support;            ///< one a group: 0-based index into the surfaces
-  std::vector<std::size_t> size;       ///< one a group
-  std::vector<std::int8_t> above;      ///< one a point: -1, or the index of the surface it stands above (low fringe included)
-  std::vector<float> height;           ///< one a point, above that surface [m]
+  std::vector<std::uint16_t> group;  ///< one a point: 0, or k for the k-th group
+  std::vector<int> support;          ///< one a group: 0-based index into the surfaces
+  std::vector<std::size_t> size;     ///< one a group
+  std::vector<std::int8_t> above;    ///< one a point: -1, or the index of the surface it stands above (low fringe included)
+  std::vector<float> height;         ///< one a point, above that surface [m]
 };
 
 /// Groups of points above `surfaces`, within their extent, up to the next surface and `max_height`.

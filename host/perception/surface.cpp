@@ -11,17 +11,17 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr float kCell = 0.02f;           // [m] finest cell
-constexpr int kMostCells = 512;          // along a side; a hall gets coarser cells
-constexpr float kGap = 0.12f;            // [m] parts of a plane this near are one surface: things stand in between and throw shadows
-constexpr float kEdge = 0.05f;           // [m] nearer to the hull is its edge
-constexpr int kUnbroken = 2;             // [cells] a piece has no wider gaps
-constexpr double kSplinter = 0.03;       // of the largest surface's area; smaller parts are none
-constexpr double kTopArea = 0.07;        // [m^2] the largest top of a thing that is carried
-constexpr double kTopLength = 0.45;      // [m] and its longest side
-constexpr double kSeatHeight = 0.28;     // [m] from here on it is rather a piece of furniture, and a thing's top is smaller:
-constexpr double kHighTopArea = 0.03;    // [m^2]
-constexpr double kReasonableArea = 0.01; // [m^2] nothing smaller carries anything
+constexpr float kCell = 0.02f;               // [m] finest cell
+constexpr int kMostCells = 512;              // along a side; a hall gets coarser cells
+constexpr float kGap = 0.12f;                // [m] parts of a plane this near are one surface: things stand in between and throw shadows
+constexpr float kEdge = 0.05f;               // [m] nearer to the hull is its edge
+constexpr int kUnbroken = 2;                 // [cells] a piece has no wider gaps
+constexpr double kSplinter = 0.03;           // of the largest surface's area; smaller parts are none
+constexpr double kTopArea = 0.07;            // [m^2] the largest top of a thing that is carried
+constexpr double kTopLength = 0.45;          // [m] and its longest side
+constexpr double kSeatHeight = 0.28;         // [m] from here on it is rather a piece of furniture, and a thing's top is smaller:
+constexpr double kHighTopArea = 0.03;        // [m^2]
+constexpr double kReasonableArea = 0.01;     // [m^2] nothing smaller carries anything
 constexpr float kNoiseAtOneMetre = 0.0015f;  // [m] where there are too few inliers to measure it
 
 using Points2 = std::vector<Eigen::Vector2f>;
@@ -214,7 +214,8 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
 
 bool Surface::near_component(const Eigen::Vector3f& p, float reach) const noexcept {
   const int steps = static_cast<int>(reach / cell);
-  const int a0 = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell)), b0 = static_cast<int>(std::floor((axis_b.dot(p) - low.y()) / cell));
+  const int a0 = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell)),
+            b0 = static_cast<int>(std::floor((axis_b.dot(p) - low.y()) / cell));
   for (int b = std::max(0, b0 - steps); b <= std::min(rows - 1, b0 + steps); ++b)
     for (int a = std::max(0, a0 - steps); a <= std::min(columns - 1, a0 + steps); ++a)
       if (component[static_cast<std::size_t>(b * columns + a)] != 0) return true;
@@ -224,7 +225,8 @@ bool Surface::near_component(const Eigen::Vector3f& p, float reach) const noexce
 double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> labels, const Surface& surface) {
   std::vector<float> scaled;
   for (std::size_t i = 0; i < grid.size(); i += 7)
-    if (labels[i] == surface.model) scaled.push_back(std::abs(surface.plane.height(grid.points[i])) / std::max(0.25f, grid.points[i].squaredNorm()));
+    if (labels[i] == surface.model)
+      scaled.push_back(std::abs(surface.plane.height(grid.points[i])) / std::max(0.25f, grid.points[i].squaredNorm()));
   if (scaled.size() < 50 || !grid.organised()) return kNoiseAtOneMetre;
   const auto middle = scaled.begin() + static_cast<std::ptrdiff_t>(scaled.size() / 2);
   std::nth_element(scaled.begin(), middle, scaled.end());

@@ -12,17 +12,17 @@ namespace swarmfit::perception {
 /// One plane's surfaces as a bitmap in the plane's own coordinates. A plane may carry several (two tables of one height).
 struct Surface {
   LocalPlane plane;
-  int model = 0;                            ///< 1-based index into the fit's models
+  int model = 0;  ///< 1-based index into the fit's models
   Eigen::Vector3f axis_a = Eigen::Vector3f::UnitX(), axis_b = Eigen::Vector3f::UnitY();
   Eigen::Vector2f low = Eigen::Vector2f::Zero();
-  float cell = 0;                           ///< [m]
+  float cell = 0;  ///< [m]
   int columns = 0, rows = 0;
-  std::vector<std::uint8_t> extent;         ///< 2 well within a surface's hull, 1 at its edge and in the margin, row after row
-  std::vector<std::uint8_t> component;      ///< 1 on cells of a kept surface, without the hull; what is connected with the plane
-  double area = 0;                          ///< seen by the sensor, all kept surfaces [m^2]
-  double piece_area = 0;                    ///< hull of the largest unbroken piece [m^2]
-  double piece_length = 0;                  ///< of that piece, along its principal axis [m]
-  double noise = 0;                         ///< standard deviation of the inliers' heights at a range of one metre; grows with its square
+  std::vector<std::uint8_t> extent;     ///< 2 well within a surface's hull, 1 at its edge and in the margin, row after row
+  std::vector<std::uint8_t> component;  ///< 1 on cells of a kept surface, without the hull; what is connected with the plane
+  double area = 0;                      ///< seen by the sensor, all kept surfaces [m^2]
+  double piece_area = 0;                ///< hull of the largest unbroken piece [m^2]
+  double piece_length = 0;              ///< of that piece, along its principal axis [m]
+  double noise = 0;                     ///< standard deviation of the inliers' heights at a range of one metre; grows with its square
 
   int cell_of(const Eigen::Vector3f& p) const noexcept {
     const int a = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell));

@@ -8,11 +8,11 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr double kRises = 0.3;        // a plane whose normal leans this far to the image's top is seen from above: a floor or a table
-constexpr double kWallWeight = 0.2;   // one that faces the camera may be a wall as well as a table seen from straight above
+constexpr double kRises = 0.3;       // a plane whose normal leans this far to the image's top is seen from above: a floor or a table
+constexpr double kWallWeight = 0.2;  // one that faces the camera may be a wall as well as a table seen from straight above
 constexpr double kCeilingWeight = 0.02;
-constexpr double kLeans = 0.35;       // across the image; cameras are seldom rolled
-constexpr double kParallel = 0.995;   // cosine of 6 degrees
+constexpr double kLeans = 0.35;      // across the image; cameras are seldom rolled
+constexpr double kParallel = 0.995;  // cosine of 6 degrees
 constexpr double kLeanWeight = 0.2;
 
 /// Where the image's right and its bottom lie in the cloud's frame; empty without an image grid.
@@ -25,7 +25,9 @@ std::optional<ImageAxes> image_axes(const PointGrid& grid) {
   Eigen::Vector3d right = Eigen::Vector3d::Zero(), down = Eigen::Vector3d::Zero();
   const int du = std::max(1, grid.width / 16), dv = std::max(1, grid.height / 16);
   const auto ray = [&](int u, int v) -> Eigen::Vector3d {
-    return grid.points[static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u)].cast<double>().normalized();
+    return grid.points[static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u)]
+        .cast<double>()
+        .normalized();
   };
   for (int v = 0; v + dv < grid.height; v += 4)
     for (int u = 0; u + du < grid.width; u += 4) {

@@ -33,9 +33,9 @@ Expected<> check_points(const PointsView& points, const models::WorkingPoints& w
   }
   if (working.rank() < space.minimal_sample() - 1) {
     const char* shape = working.rank() == 0 ? "all coincide" : "are collinear";
-    return fail(Error::Kind::bad_input, fmt::format("the {} finite points {}: rank is {}, must be >= {} to fit a {}",
-                                                    working.finite_count(), shape, working.rank(), space.minimal_sample() - 1,
-                                                    name(space.type())));
+    return fail(Error::Kind::bad_input,
+                fmt::format("the {} finite points {}: rank is {}, must be >= {} to fit a {}", working.finite_count(), shape, working.rank(),
+                            space.minimal_sample() - 1, name(space.type())));
   }
   return {};
 }

@@ -11,16 +11,22 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
-constexpr int kRounds = 8;      // of refinement
-constexpr int kFullRounds = 2;  // of it on all points, where it was done on a part of them before
+constexpr double kStable = 0.01;            // spread of the list of global bests, as a share of the scale, below which it is stable
+constexpr int kRounds = 8;                  // of refinement
+constexpr int kFullRounds = 2;              // of it on all points, where it was done on a part of them before
 constexpr std::size_t kSampledFrom = 8192;  // points that minimal samples are drawn from: enough to tell surfaces apart
 
 }  // namespace
 
 MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
                        const models::WorkingPoints& points, const Settings& settings, std::uint64_t seed, Limits limits)
-    : evaluator_(evaluator), scout_(scout), space_(space), points_(points), settings_(settings), random_(seed), limits_(std::move(limits)),
+    : evaluator_(evaluator),
+      scout_(scout),
+      space_(space),
+      points_(points),
+      settings_(settings),
+      random_(seed),
+      limits_(std::move(limits)),
       landscape_(evaluator, space, points.frame(), settings),
       searched_(scout != nullptr ? *scout : evaluator, space, points.frame(), settings),
       subset_(points, random_, scout != nullptr ? settings.search_points : kSampledFrom) {

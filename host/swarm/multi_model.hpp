@@ -57,17 +57,17 @@ class MultiModel {
   double loss_of_nothing() const;
 
   kernels::FitnessEvaluator& evaluator_;
-  kernels::FitnessEvaluator* scout_;            // null where the search is on all points
+  kernels::FitnessEvaluator* scout_;  // null where the search is on all points
   const models::ModelSpace& space_;
   const models::WorkingPoints& points_;
   const Settings& settings_;
   Random random_;
   Limits limits_;
-  Landscape landscape_, searched_;              // of all points, and of those that are searched on
-  Subset subset_;                               // what samples are drawn from, and the scout's points
+  Landscape landscape_, searched_;             // of all points, and of those that are searched on
+  Subset subset_;                              // what samples are drawn from, and the scout's points
   std::vector<float> tau_, caps_, distances_;  // one a point; caps_ is what is left to explain, in both kinds of deflation
   std::vector<models::Position> found_;
-  double scale_ = 0;                           // loss of a model that explains nothing
+  double scale_ = 0;  // loss of a model that explains nothing
   std::size_t steps_ = 0;
   std::string stop_reason_;
 };

@@ -8,11 +8,11 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kSigmas = 2.5;         // 98.8 % of a Gaussian lie within
-constexpr double kGenerous = 0.08;      // first threshold, in units of the cloud's own spread
-constexpr double kLeast = 1e-6;         // no threshold below this, in the same units: float coordinates carry no more
+constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
+constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
+constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
 constexpr int kRounds = 10;
-constexpr std::size_t kModels = 4;      // the most prominent ones tell the scale
+constexpr std::size_t kModels = 4;  // the most prominent ones tell the scale
 
 }  // namespace
 

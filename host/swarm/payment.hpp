@@ -10,9 +10,9 @@ namespace swarmfit::swarm {
 
 /// What a candidate explains of what nobody has explained yet.
 struct Support {
-  std::size_t inliers = 0;     ///< unexplained points within tau
-  std::size_t band = 0;        ///< unexplained points between tau and 3 tau: what surrounds the model
-  std::size_t unexplained = 0; ///< all unexplained points
+  std::size_t inliers = 0;      ///< unexplained points within tau
+  std::size_t band = 0;         ///< unexplained points between tau and 3 tau: what surrounds the model
+  std::size_t unexplained = 0;  ///< all unexplained points
 };
 
 /// A point is unexplained while its cap is at least half of its tau. NaN distances count for nothing.

@@ -7,7 +7,7 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr float kCorner = 0.1F;            // of tau: below this a residual weighs as in least squares, so that none weighs infinitely
+constexpr float kCorner = 0.1F;       // of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
 
 Expected<> measure(const Ground& ground, const models::Position& theta, std::vector<float>& distances) {

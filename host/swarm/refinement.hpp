@@ -15,8 +15,8 @@ struct Ground {
   kernels::FitnessEvaluator& evaluator;
   const models::ModelSpace& space;
   const models::WorkingPoints& points;
-  std::span<const float> tau;             ///< one a point of the evaluator [data unit]
-  std::span<const std::uint32_t> index;   ///< input index of each point of the evaluator; empty: it holds the whole cloud
+  std::span<const float> tau;            ///< one a point of the evaluator [data unit]
+  std::span<const std::uint32_t> index;  ///< input index of each point of the evaluator; empty: it holds the whole cloud
 };
 
 /// Least absolute deviations, by reweighting, on the points within tau that are not better explained already (distance below their cap),

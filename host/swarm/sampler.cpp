@@ -6,8 +6,8 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr std::uint32_t kAttempts = 32;   // of a sample that turns out degenerate
-constexpr double kNearby = 0.003;         // of the candidates, on each side of a point in their order, are nearby
+constexpr std::uint32_t kAttempts = 32;  // of a sample that turns out degenerate
+constexpr double kNearby = 0.003;        // of the candidates, on each side of a point in their order, are nearby
 constexpr std::size_t kLeastNearby = 12;
 
 }  // namespace

@@ -22,8 +22,8 @@ bool positive(double v) { return v > 0 && std::isfinite(v); }
 
 Expected<> check_prior(const DirectionPrior& prior) {
   if (!(prior.axis.allFinite() && prior.axis.norm() > 0)) {
-    return fail(Error::Kind::invalid_option, fmt::format("prior.axis is ({}, {}, {}), must be finite and not zero", prior.axis.x(),
-                                                         prior.axis.y(), prior.axis.z()));
+    return fail(Error::Kind::invalid_option,
+                fmt::format("prior.axis is ({}, {}, {}), must be finite and not zero", prior.axis.x(), prior.axis.y(), prior.axis.z()));
   }
   return require(prior.max_angle > 0 && prior.max_angle <= 1.5707963267948968, "prior.max_angle", prior.max_angle, "in (0, pi/2] rad");
 }

@@ -17,25 +17,25 @@ struct Settings {
   int particles = 100;
   int iterations = 200;
   int stall = 20;
-  double inertia = 1.0;              ///< w of Eq. (1)
-  double cognitive = 2.1;            ///< c1
-  double social = 2.0;               ///< c2
-  int roulette_length = 10;          ///< n of Eq. (2)
+  double inertia = 1.0;      ///< w of Eq. (1)
+  double cognitive = 2.1;    ///< c1
+  double social = 2.0;       ///< c2
+  int roulette_length = 10;  ///< n of Eq. (2)
   Topology topology = Topology::roulette;
-  int ring_radius = 2;               ///< neighbours on each side
-  double local_share = 0;            ///< of the minimal samples that take nearby points, in [0, 1]
-  double renewal_share = 0;          ///< of the particles that start anew from a sample at each step, in [0, 1]
-  double still = 0;                  ///< a global best that gains less than this share of the saving has not moved
-  std::size_t search_points = 0;     ///< a larger cloud is searched on this many of its points; 0: on all
+  int ring_radius = 2;            ///< neighbours on each side
+  double local_share = 0;         ///< of the minimal samples that take nearby points, in [0, 1]
+  double renewal_share = 0;       ///< of the particles that start anew from a sample at each step, in [0, 1]
+  double still = 0;               ///< a global best that gains less than this share of the saving has not moved
+  std::size_t search_points = 0;  ///< a larger cloud is searched on this many of its points; 0: on all
   Deflation deflation = Deflation::residual;
-  double lambda = 10;                ///< Eq. (5)
-  double dead_zone_slope = 2;        ///< kappa of design 2.1: how fast caps rise beyond the dead zone
+  double lambda = 10;          ///< Eq. (5)
+  double dead_zone_slope = 2;  ///< kappa of design 2.1: how fast caps rise beyond the dead zone
   Loss loss = Loss::truncated_l1;
-  int patience = 2;                  ///< swarms in a row whose best does not pay before the fit ends
-  bool refine = true;                ///< least squares on the inliers of what converged
-  bool joint = true;                 ///< refine all models together at the end
-  double threshold = 0.01;           ///< tau [data unit]
-  std::size_t min_inliers = 0;       ///< resolved, >= 1
+  int patience = 2;             ///< swarms in a row whose best does not pay before the fit ends
+  bool refine = true;           ///< least squares on the inliers of what converged
+  bool joint = true;            ///< refine all models together at the end
+  double threshold = 0.01;      ///< tau [data unit]
+  std::size_t min_inliers = 0;  ///< resolved, >= 1
 };
 
 /// `finite_points`: of the cloud that is fitted; `threshold` in the data's unit.

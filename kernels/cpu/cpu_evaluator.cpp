@@ -40,9 +40,7 @@ bool same_ignoring_case(std::string_view a, std::string_view b) {
 }
 
 /// Without the number of threads: a result is the same bytes on any.
-std::string device_name(const CpuKernels& kernels) {
-  return fmt::format("CPU, {}", kernels.name);
-}
+std::string device_name(const CpuKernels& kernels) { return fmt::format("CPU, {}", kernels.name); }
 
 /// Work that may run out of memory, with the failure as a value.
 template <class Work>
@@ -128,9 +126,8 @@ class CpuEvaluator final : public FitnessEvaluator {
       for (std::size_t m = 0; m < models.size(); ++m) usable[m] = centre(models[m], coefficients[m].data());
       std::fill(labels.begin(), labels.end(), std::uint16_t{0});
       arena_.execute([&] {
-        tbb::parallel_for(std::size_t{0}, store_.tiles(), [&](std::size_t tile) {
-          assign_tile(tile, models, coefficients, usable, tolerance, labels);
-        });
+        tbb::parallel_for(std::size_t{0}, store_.tiles(),
+                          [&](std::size_t tile) { assign_tile(tile, models, coefficients, usable, tolerance, labels); });
       });
     });
   }
@@ -182,7 +179,7 @@ class CpuEvaluator final : public FitnessEvaluator {
   Identity identity_;
   PointStore store_;
   std::vector<float> coefficients_;
-  std::vector<char> finite_;      ///< a model: whether its coefficients are finite
+  std::vector<char> finite_;  ///< a model: whether its coefficients are finite
   SwarmCosts costs_;
   Effort effort_;
 };
@@ -197,7 +194,8 @@ Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOpti
   const int most = tbb::info::default_concurrency();
   const int threads = options.threads > 0 ? std::min(options.threads, most) : most;
   for (const CpuKernels* kernels : available_kernels()) {
-    if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name)) return std::make_unique<CpuEvaluator>(*kernels, threads, options.pruning);
+    if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name))
+      return std::make_unique<CpuEvaluator>(*kernels, threads, options.pruning);
   }
   return fail(Failure::Kind::unavailable,
               fmt::format("simd is '{}', must be one of what this processor has: {}", options.simd, fmt::join(kernel_names(), ", ")));

@@ -312,8 +312,8 @@ HWY_INLINE void bound_of(const TileBounds& tile, const float* HWY_RESTRICT coeff
   }
 }
 
-void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models,
-           Open* open, PartialBound* bounds) {
+void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models, Open* open,
+           PartialBound* bounds) {
   visit_model(kind, [&]<class Model>() HWY_ATTR {
     if constexpr (Model::traits.affine) {
       if (loss == Loss::truncated_l1) return bound_of<Model, Loss::truncated_l1>(tile, coefficients, slack, models, open, bounds);
@@ -340,13 +340,15 @@ double spin_fma(std::size_t rounds, float* sink) {
     a8 = hn::MulAdd(a8, factor, term);
     a9 = hn::MulAdd(a9, factor, term);
   }
-  const Vector all = hn::Add(hn::Add(hn::Add(a0, a1), hn::Add(a2, a3)), hn::Add(hn::Add(a4, a5), hn::Add(a6, hn::Add(a7, hn::Add(a8, a9)))));
+  const Vector all =
+      hn::Add(hn::Add(hn::Add(a0, a1), hn::Add(a2, a3)), hn::Add(hn::Add(a4, a5), hn::Add(a6, hn::Add(a7, hn::Add(a8, a9)))));
   *sink = hn::GetLane(all);
   return 10.0 * static_cast<double>(rounds) * static_cast<double>(lanes());
 }
 
 const CpuKernels& kernel_table() {
-  static const CpuKernels table{hwy::TargetName(HWY_TARGET), lanes(), add_costs, add_open_costs, cap_units, bound, distances, keep_nearest, spin_fma};
+  static const CpuKernels table{
+      hwy::TargetName(HWY_TARGET), lanes(), add_costs, add_open_costs, cap_units, bound, distances, keep_nearest, spin_fma};
   return table;
 }
 

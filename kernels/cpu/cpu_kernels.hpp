@@ -55,9 +55,9 @@ struct TileBounds {
 
 /// What is known of a model over part of the cloud before any point is touched.
 struct PartialBound {
-  std::int64_t settled = 0;   ///< quanta of blocks beyond the caps
-  double within = 0;          ///< lower bound over blocks that lie within the caps
-  double mixed = 0;           ///< lower bound over the others
+  std::int64_t settled = 0;  ///< quanta of blocks beyond the caps
+  double within = 0;         ///< lower bound over blocks that lie within the caps
+  double mixed = 0;          ///< lower bound over the others
 };
 
 /// A model's blocks of a tile that must be looked at, a bit each.

@@ -29,8 +29,8 @@ class PointStore {
   void prepare_bounds(const CpuKernels& kernels, const Summing& summing);
 
   int dimension() const noexcept { return dimension_; }
-  std::size_t count() const noexcept { return count_; }      ///< points given
-  std::size_t finite() const noexcept { return finite_; }    ///< points kept
+  std::size_t count() const noexcept { return count_; }    ///< points given
+  std::size_t finite() const noexcept { return finite_; }  ///< points kept
   std::size_t tiles() const noexcept { return (blocks_ + kTileBlocks - 1) / kTileBlocks; }
   TileView tile(std::size_t index) const noexcept;
   const TileBounds& bounds(std::size_t tile) const noexcept { return bounds_[tile]; }

@@ -152,7 +152,8 @@ void SwarmCosts::bound_all(const PointStore& points, const CentredSwarm& swarm, 
   }
 }
 
-std::uint64_t SwarmCosts::add_open(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::uint8_t Open::*blocks) {
+std::uint64_t SwarmCosts::add_open(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                                   std::uint8_t Open::*blocks) {
   if (alive_.empty()) return 0;
   const std::size_t width = width_of(swarm.kind);
   const Runs runs(points.tiles());

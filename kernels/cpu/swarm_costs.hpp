@@ -39,14 +39,14 @@ class SwarmCosts {
 
   const CpuKernels& kernels_;
   bool pruning_;
-  int pause_ = 0;       ///< evaluations to go before pruning is tried again
+  int pause_ = 0;  ///< evaluations to go before pruning is tried again
   int last_pause_ = 0;
 
-  std::vector<PartialCost> partial_;   ///< a run of tiles and a model
-  std::vector<PartialBound> bounds_;   ///< a run of tiles and a model
-  std::vector<Open> open_;             ///< a tile and a model
+  std::vector<PartialCost> partial_;  ///< a run of tiles and a model
+  std::vector<PartialBound> bounds_;  ///< a run of tiles and a model
+  std::vector<Open> open_;            ///< a tile and a model
   std::vector<float> slack_;
-  std::vector<std::uint32_t> alive_;   ///< models whose cost may still be below the cutoff
+  std::vector<std::uint32_t> alive_;  ///< models whose cost may still be below the cutoff
   std::vector<float> alive_coefficients_;
   std::vector<double> bound_within_, bound_mixed_;  ///< a model
   std::vector<std::int64_t> units_;                 ///< a model: quanta known exactly

@@ -43,7 +43,8 @@ Buffer::Buffer(const Device& device, std::size_t bytes, Residence residence)
   memory_ = vk::raii::DeviceMemory(device.handle(), vk::MemoryAllocateInfo(needs.size, type));
   buffer_.bindMemory(*memory_, 0);
   if (device.traits().texels) {
-    texels_ = vk::raii::BufferView(device.handle(), vk::BufferViewCreateInfo({}, *buffer_, vk::Format::eR32G32B32A32Sfloat, 0, VK_WHOLE_SIZE));
+    texels_ =
+        vk::raii::BufferView(device.handle(), vk::BufferViewCreateInfo({}, *buffer_, vk::Format::eR32G32B32A32Sfloat, 0, VK_WHOLE_SIZE));
   }
   if (residence == Residence::device && device.traits().staging) return;
   const vk::MemoryPropertyFlags host = Property::eHostVisible | Property::eHostCoherent;

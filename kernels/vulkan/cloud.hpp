@@ -14,7 +14,7 @@ struct Segment {
   std::uint32_t count = 0;   ///< finite points
   std::uint32_t stride = 0;  ///< points in a column: count, padded to whole chunks with points of cap 0
   std::uint32_t chunks = 0;
-  std::uint32_t sums = 0;    ///< partial sums of a particle
+  std::uint32_t sums = 0;  ///< partial sums of a particle
   Buffer points;
   Buffer caps;
   Buffer partials;   ///< [particle][partial sum]

@@ -17,7 +17,7 @@ using Stage = vk::PipelineStageFlagBits;
 using Access = vk::AccessFlagBits;
 
 constexpr std::size_t kPartialsLimit = std::size_t{256} << 20;  // bytes for all partial sums
-constexpr std::size_t kRowFloats = 64;                          // rows of costs start 256 bytes apart, the largest alignment Vulkan may ask for
+constexpr std::size_t kRowFloats = 64;  // rows of costs start 256 bytes apart, the largest alignment Vulkan may ask for
 constexpr std::size_t kMostRecorded = 64;
 
 std::uint32_t reduce_group(const DeviceTraits& device) { return device.software ? device.subgroup : std::min(64U, device.group_limit); }
@@ -104,7 +104,8 @@ void Commands::bind_set(vk::DescriptorSet set, const Segment& segment, const Buf
                                                          {caps.handle(), 0, VK_WHOLE_SIZE},
                                                          {coefficients_.handle(), 0, VK_WHOLE_SIZE},
                                                          {out.handle(), 0, VK_WHOLE_SIZE}}};
-  device_.handle().updateDescriptorSets(vk::WriteDescriptorSet(set, layout::kBindPoints, 0, vk::DescriptorType::eStorageBuffer, {}, buffers), {});
+  device_.handle().updateDescriptorSets(
+      vk::WriteDescriptorSet(set, layout::kBindPoints, 0, vk::DescriptorType::eStorageBuffer, {}, buffers), {});
   if (!device_.traits().texels) return;
   const std::array views{segment.points.texels(), caps.texels(), coefficients_.texels(), out.texels()};
   device_.handle().updateDescriptorSets(
@@ -115,8 +116,8 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
   const vk::PipelineLayout layout = pipelines_.layout();
   const auto dimension = static_cast<std::uint32_t>(dimension_);
   const ChunkShape& chunk = cloud_->shape();
-  const vk::Pipeline cost = pipelines_.get({Shader::cost, chunk.group, static_cast<std::uint32_t>(kind), static_cast<std::uint32_t>(loss),
-                                            dimension, shape.tile, chunk.work});
+  const vk::Pipeline cost = pipelines_.get(
+      {Shader::cost, chunk.group, static_cast<std::uint32_t>(kind), static_cast<std::uint32_t>(loss), dimension, shape.tile, chunk.work});
   const vk::Pipeline reduce = pipelines_.get({.shader = Shader::reduce, .group = reduce_group(device_.traits())});
 
   vk::raii::CommandBuffer commands = device_.allocate_commands();

@@ -51,9 +51,9 @@ class Commands {
   Cloud* cloud_ = nullptr;
   int dimension_ = 0;
   Buffer coefficients_;
-  Buffer costs_;                  // [segment][particle], rows cost_stride_ floats apart
+  Buffer costs_;  // [segment][particle], rows cost_stride_ floats apart
   std::size_t cost_stride_ = 0;
-  std::size_t room_ = 0;          // particles that partials and costs have room for
+  std::size_t room_ = 0;  // particles that partials and costs have room for
   vk::raii::DescriptorPool pool_{nullptr};
   std::vector<vk::raii::DescriptorSet> cost_sets_, map_sets_;  // one a segment
   std::map<Key, vk::raii::CommandBuffer> recorded_;

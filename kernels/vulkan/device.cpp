@@ -9,8 +9,9 @@ namespace swarmfit::kernels::vulkan {
 namespace {
 
 DeviceTraits traits_of(const vk::raii::PhysicalDevice& physical, const EvaluatorOptions& options) {
-  const auto chain = physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties,
-                                             vk::PhysicalDeviceMaintenance3Properties>();
+  const auto chain =
+      physical
+          .getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties, vk::PhysicalDeviceMaintenance3Properties>();
   const vk::PhysicalDeviceProperties& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;
   DeviceTraits traits;
   traits.name = properties.deviceName.data();

@@ -113,7 +113,8 @@ DeviceDescription describe(const vk::raii::PhysicalDevice& device) {
   description.reason = obstacle(device);
   description.usable = description.reason.empty();
   if (description.usable) {
-    description.reason = properties.deviceType == vk::PhysicalDeviceType::eCpu ? "software: by name only, auto passes it over" : "auto takes it";
+    description.reason =
+        properties.deviceType == vk::PhysicalDeviceType::eCpu ? "software: by name only, auto passes it over" : "auto takes it";
   }
   const std::uint32_t version = properties.apiVersion;
   description.limits = {

@@ -165,7 +165,8 @@ Result<> VulkanEvaluator::distances(const ModelView& model, std::span<float> dis
 Result<> VulkanEvaluator::assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) {
   if (auto ok = check_assign(models, dimension_, cloud_.extent().finite.size(), tolerance, labels); !ok) return ok;
   if (models.size() > commands_.model_limit()) {
-    return fail(Failure::Kind::invalid, fmt::format("models.size() is {}, must be <= {} on {}", models.size(), commands_.model_limit(), identity_.device));
+    return fail(Failure::Kind::invalid,
+                fmt::format("models.size() is {}, must be <= {} on {}", models.size(), commands_.model_limit(), identity_.device));
   }
   return guarded("assign", Failure::Kind::device, [&]() -> Result<> {
     std::fill(labels.begin(), labels.end(), std::uint16_t{0});
@@ -186,7 +187,9 @@ Result<> VulkanEvaluator::assign(std::span<const ModelView> models, std::span<co
 }
 
 bool contains_ignoring_case(std::string_view text, std::string_view part) {
-  const auto same = [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b)); };
+  const auto same = [](char a, char b) {
+    return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
+  };
   return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
 }
 
@@ -202,9 +205,8 @@ Result<std::unique_ptr<FitnessEvaluator>> make(const EvaluatorOptions& options, 
     seen += fmt::format("{}{}{}", seen.empty() ? "" : ", ", device_name, why.empty() ? "" : " (" + why + ")");
   }
   if (seen.empty()) seen = "none";
-  return fail(Failure::Kind::unavailable,
-              name.empty() ? fmt::format("backend is 'vulkan', but no device can be used; there are: {}", seen)
-                           : fmt::format("vulkan device is '{}', must be one of: {}", name, seen));
+  return fail(Failure::Kind::unavailable, name.empty() ? fmt::format("backend is 'vulkan', but no device can be used; there are: {}", seen)
+                                                       : fmt::format("vulkan device is '{}', must be one of: {}", name, seen));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace swarmfit {
 
 /// Who did the work, and why it was chosen.
 struct BackendInfo {
-  std::string name;    ///< "cpu", "vulkan", "reference"
+  std::string name;  ///< "cpu", "vulkan", "reference"
   std::string device;
   std::string reason;
 };
@@ -19,8 +19,8 @@ struct BackendInfo {
 /// One way to evaluate on this machine.
 struct Device {
   std::string backend;
-  std::string name;    ///< accepted by FitOptions::backend
-  std::string kind;    ///< "cpu", "discrete GPU", "integrated GPU", "software"
+  std::string name;  ///< accepted by FitOptions::backend
+  std::string kind;  ///< "cpu", "discrete GPU", "integrated GPU", "software"
   bool usable = false;
   std::string reason;  ///< why it cannot be used, or what `auto` thinks of it
   std::vector<std::pair<std::string, std::string>> limits;

@@ -15,13 +15,13 @@ namespace swarmfit {
 class PointsView;
 
 struct BenchOptions {
-  std::vector<std::string> backends;       ///< empty: every usable one (reference left out)
-  std::vector<ModelType> models;           ///< empty: every kind
+  std::vector<std::string> backends;                          ///< empty: every usable one (reference left out)
+  std::vector<ModelType> models;                              ///< empty: every kind
   std::vector<std::size_t> points = {10000, 100000, 307200};  ///< each >= 1
   std::vector<std::size_t> particles = {64, 256};             ///< each >= 1
   std::vector<bool> pruning = {false};
-  int threads = 0;                         ///< 0: all
-  double seconds = 0.3;                    ///< least time a row is run for, > 0
+  int threads = 0;       ///< 0: all
+  double seconds = 0.3;  ///< least time a row is run for, > 0
   std::uint64_t seed = 1;
 };
 

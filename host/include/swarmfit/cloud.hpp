@@ -21,21 +21,20 @@ struct Intrinsics {
 
 /// Points in input order, perhaps on an image grid, perhaps with colour. One of `values32`, `values64` is filled: the source's own precision.
 struct Cloud {
-  int dimension = 3;                    ///< columns a point
-  std::vector<float> values32;          ///< dimension x size, row after row
+  int dimension = 3;            ///< columns a point
+  std::vector<float> values32;  ///< dimension x size, row after row
   std::vector<double> values64;
-  std::vector<std::uint8_t> rgb;        ///< 3 a point (red, green, blue), or empty
-  int width = 0, height = 0;            ///< height > 1: organised, point (u, v) is at v * width + u; else height is 1
-  std::optional<Intrinsics> intrinsics; ///< of the camera behind an organised cloud, where known
-  bool passive_stereo = false;          ///< the depth was matched between images: little worth where they have no texture
+  std::vector<std::uint8_t> rgb;         ///< 3 a point (red, green, blue), or empty
+  int width = 0, height = 0;             ///< height > 1: organised, point (u, v) is at v * width + u; else height is 1
+  std::optional<Intrinsics> intrinsics;  ///< of the camera behind an organised cloud, where known
+  bool passive_stereo = false;           ///< the depth was matched between images: little worth where they have no texture
 
-  std::size_t size() const noexcept {
-    return (values64.empty() ? values32.size() : values64.size()) / static_cast<std::size_t>(dimension);
-  }
+  std::size_t size() const noexcept { return (values64.empty() ? values32.size() : values64.size()) / static_cast<std::size_t>(dimension); }
   bool organised() const noexcept { return height > 1; }
   bool coloured() const noexcept { return !rgb.empty(); }
   PointsView points() const noexcept {
-    return values64.empty() ? PointsView(std::span<const float>(values32), dimension) : PointsView(std::span<const double>(values64), dimension);
+    return values64.empty() ? PointsView(std::span<const float>(values32), dimension)
+                            : PointsView(std::span<const double>(values64), dimension);
   }
 };
 

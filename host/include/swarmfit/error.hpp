@@ -24,8 +24,6 @@ struct Error {
 template <class T = void>
 using Expected = tl::expected<T, Error>;
 
-inline tl::unexpected<Error> fail(Error::Kind kind, std::string message) {
-  return tl::unexpected<Error>(Error{kind, std::move(message)});
-}
+inline tl::unexpected<Error> fail(Error::Kind kind, std::string message) { return tl::unexpected<Error>(Error{kind, std::move(message)}); }
 
 }  // namespace swarmfit

@@ -37,23 +37,23 @@ struct DirectionPrior {
 
 struct FitOptions {
   ModelType model = ModelType::plane;
-  std::optional<double> threshold;     ///< tau [data unit], > 0; none: the kind's default (plane 0.01), estimated where that is `auto`
-  bool estimate_threshold = false;     ///< tau from the data's own noise, whatever `threshold` says
-  Preset preset = Preset::fast;        ///< decides every option below that is left empty
-  std::optional<int> particles;        ///< M, >= 2
-  std::optional<int> iterations;       ///< most steps of one swarm, >= 1
-  std::optional<int> stall;            ///< s: converged when the global best has not moved for s steps, >= 1
+  std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane 0.01), estimated where that is `auto`
+  bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
+  Preset preset = Preset::fast;     ///< decides every option below that is left empty
+  std::optional<int> particles;     ///< M, >= 2
+  std::optional<int> iterations;    ///< most steps of one swarm, >= 1
+  std::optional<int> stall;         ///< s: converged when the global best has not moved for s steps, >= 1
   std::optional<Deflation> deflation;
-  std::optional<double> lambda;        ///< Eq. (5), > 0
+  std::optional<double> lambda;  ///< Eq. (5), > 0
   std::optional<Loss> loss;
-  std::size_t min_inliers = 0;         ///< 0: decided from the data
-  std::size_t max_models = 0;          ///< 0: no bound
-  double time_budget_ms = 0;           ///< 0: none; what is found by then is valid
+  std::size_t min_inliers = 0;  ///< 0: decided from the data
+  std::size_t max_models = 0;   ///< 0: no bound
+  double time_budget_ms = 0;    ///< 0: none; what is found by then is valid
   std::optional<DirectionPrior> prior;
   std::uint64_t seed = 1;
-  std::string backend = "auto";        ///< auto, cpu, vulkan, reference, or part of a device's name
-  int threads = 0;                     ///< of the CPU back end; 0 takes all
-  std::string pipeline_cache;          ///< folder for compiled Vulkan pipelines; empty keeps none
+  std::string backend = "auto";  ///< auto, cpu, vulkan, reference, or part of a device's name
+  int threads = 0;               ///< of the CPU back end; 0 takes all
+  std::string pipeline_cache;    ///< folder for compiled Vulkan pipelines; empty keeps none
 
   /// Fails with invalid_option, naming the field, its value and its bound.
   SWARMFIT_API Expected<> validate() const;
@@ -68,7 +68,7 @@ struct FitResult {
   std::vector<std::uint16_t> labels;  ///< one a point, in input order: 0 none, k the k-th model
   BackendInfo backend;
   std::uint64_t seed = 0;
-  double threshold = 0;               ///< tau used [data unit]
+  double threshold = 0;  ///< tau used [data unit]
   std::string stop_reason = "not called";
   std::size_t finite_points = 0;
   std::size_t iterations = 0;

@@ -30,16 +30,16 @@ SWARMFIT_API int dimension(ModelType type) noexcept;
 
 struct Model {
   ModelType type = ModelType::plane;
-  Eigen::VectorXd parameters;       ///< as listed at ModelType, in the data's frame and unit
-  std::size_t inliers = 0;          ///< points labelled with this model
-  double cost = 0;                  ///< truncated loss over all points under the caps it was found with [data unit]
-  double rms = 0;                   ///< of its inliers' distances [data unit]
-  Eigen::MatrixXd covariance;       ///< of `parameters`, parameter_count x parameter_count, from the inliers' residuals
-  bool supporting = false;          ///< set by perception: horizontal, and of reasonable size
-  std::size_t iterations = 0;       ///< swarm steps spent on it
-  std::size_t evaluations = 0;      ///< particles scored for it
-  double points_touched = 1;        ///< share of points x particles really computed, in [0, 1]
-  double found_at_ms = 0;           ///< since the start of the fit
+  Eigen::VectorXd parameters;   ///< as listed at ModelType, in the data's frame and unit
+  std::size_t inliers = 0;      ///< points labelled with this model
+  double cost = 0;              ///< truncated loss over all points under the caps it was found with [data unit]
+  double rms = 0;               ///< of its inliers' distances [data unit]
+  Eigen::MatrixXd covariance;   ///< of `parameters`, parameter_count x parameter_count, from the inliers' residuals
+  bool supporting = false;      ///< set by perception: horizontal, and of reasonable size
+  std::size_t iterations = 0;   ///< swarm steps spent on it
+  std::size_t evaluations = 0;  ///< particles scored for it
+  double points_touched = 1;    ///< share of points x particles really computed, in [0, 1]
+  double found_at_ms = 0;       ///< since the start of the fit
 
   /// plane: the unit normal; line2d: the unit normal with z = 0.
   Eigen::Vector3d normal() const {

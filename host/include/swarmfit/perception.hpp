@@ -22,18 +22,19 @@ namespace swarmfit {
 struct PerceiveOptions {
   FitOptions fit;                          ///< how planes are found; model is plane, prior is set by perception
   std::optional<Eigen::Vector3d> gravity;  ///< direction of gravity in the cloud's frame; length does not matter, not zero
-  std::optional<double> camera_tilt;       ///< [rad] the camera looks down by this much below the horizon, in [-pi/2, pi/2]; x right, y down, z forward
-  double horizontal_angle = 0.20;          ///< [rad] a supporting plane's normal is within this of the vertical, in (0, pi/2)
-  double min_plane_share = 0.005;          ///< of the finite points a plane of reasonable size holds, in (0, 1)
-  double min_height = 0.008;               ///< [m] a point sticks out when it is at least this far above its plane
-  double max_height = 0.6;                 ///< [m] and at most this far
-  double flood_step = 0.02;                ///< [m] neighbours in the flood fill are at most this far apart
-  std::size_t min_soi_points = 300;        ///< smaller groups are debris (for a 640 x 480 frame; scaled by the image's size)
-  double soi_margin = 1.15;                ///< the bounding sphere is larger than the group by this factor, >= 1
-  int colour_neighbours = 0;               ///< K of the colour cost; 0 takes it from the sample's size
-  double uncertain_cost = 0;               ///< fixed cost of the third label, in (0, 1); 0: the default of the preset
-  double smoothness = 0;                   ///< weight of the boundary term, > 0; 0: the default of the preset
-  std::filesystem::path gallery;           ///< folder: one image, or a folder of images, a name; empty: no recognition
+  std::optional<double>
+      camera_tilt;  ///< [rad] the camera looks down by this much below the horizon, in [-pi/2, pi/2]; x right, y down, z forward
+  double horizontal_angle = 0.20;    ///< [rad] a supporting plane's normal is within this of the vertical, in (0, pi/2)
+  double min_plane_share = 0.005;    ///< of the finite points a plane of reasonable size holds, in (0, 1)
+  double min_height = 0.008;         ///< [m] a point sticks out when it is at least this far above its plane
+  double max_height = 0.6;           ///< [m] and at most this far
+  double flood_step = 0.02;          ///< [m] neighbours in the flood fill are at most this far apart
+  std::size_t min_soi_points = 300;  ///< smaller groups are debris (for a 640 x 480 frame; scaled by the image's size)
+  double soi_margin = 1.15;          ///< the bounding sphere is larger than the group by this factor, >= 1
+  int colour_neighbours = 0;         ///< K of the colour cost; 0 takes it from the sample's size
+  double uncertain_cost = 0;         ///< fixed cost of the third label, in (0, 1); 0: the default of the preset
+  double smoothness = 0;             ///< weight of the boundary term, > 0; 0: the default of the preset
+  std::filesystem::path gallery;     ///< folder: one image, or a folder of images, a name; empty: no recognition
 
   SWARMFIT_API Expected<> validate() const;
 };
@@ -49,24 +50,24 @@ struct SpaceOfInterest {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [m]
   double radius = 0;                                 ///< [m], slightly larger than the group
   std::size_t points = 0;
-  int plane = 0;                                     ///< 1-based index into models
-  std::array<int, 4> bbox{};                         ///< x, y, width, height [px]; zeros without an image grid
-  std::vector<Recognition> recognised;               ///< best first
+  int plane = 0;                        ///< 1-based index into models
+  std::array<int, 4> bbox{};            ///< x, y, width, height [px]; zeros without an image grid
+  std::vector<Recognition> recognised;  ///< best first
 };
 
 /// Label in `objects` for pixels where neither object nor background is likely.
 inline constexpr std::uint16_t kUncertain = 65535;
 
 struct PerceiveResult {
-  FitResult fit;                       ///< models (planes) and labels; supporting ones are marked
+  FitResult fit;                                 ///< models (planes) and labels; supporting ones are marked
   Eigen::Vector3d up = Eigen::Vector3d::Zero();  ///< the vertical used, against gravity
-  std::string vertical_source;         ///< "gravity", "camera tilt", "dominant plane"
+  std::string vertical_source;                   ///< "gravity", "camera tilt", "dominant plane"
   std::vector<SpaceOfInterest> sois;
   std::vector<std::uint16_t> popout;   ///< one a point: 0, or k for the k-th SOI
   std::vector<std::uint16_t> objects;  ///< one a pixel: 0 background, k the k-th proto-object, kUncertain; empty without an image grid
   struct Timing {
     double total = 0, load = 0, fit = 0, popout = 0, segment = 0, recognise = 0;
-  } timing_ms;                         ///< total leaves out loading and writing files
+  } timing_ms;  ///< total leaves out loading and writing files
 };
 
 /// Holds the back end, the gallery and the vertical of the first view; reuse it over frames.
