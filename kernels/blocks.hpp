@@ -1,4 +1,4 @@
-// Spatial blocks: runs of points that lie close together, so that one bound speaks for all of them (design 2.3).
+// Spatial blocks: runs of points that lie close together, so that one bound speaks for all of them (see docs/method.md).
 #pragma once
 
 #include <array>

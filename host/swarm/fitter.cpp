@@ -15,7 +15,7 @@
 namespace swarmfit {
 namespace {
 
-constexpr double kPlaneThreshold = 0.01;  // [m], design 4
+constexpr double kPlaneThreshold = 0.01;  // [m]
 
 /// The kind's fixed default, or none where the threshold is estimated.
 std::optional<double> default_threshold(ModelType type) {

@@ -29,7 +29,7 @@ struct Settings {
   std::size_t search_points = 0;  ///< a larger cloud is searched on this many of its points; 0: on all
   Deflation deflation = Deflation::residual;
   double lambda = 10;          ///< Eq. (5)
-  double dead_zone_slope = 2;  ///< kappa of design 2.1: how fast caps rise beyond the dead zone
+  double dead_zone_slope = 2;  ///< kappa of residual deflation: how fast caps rise beyond the dead zone
   Loss loss = Loss::truncated_l1;
   int patience = 2;             ///< swarms in a row whose best does not pay before the fit ends
   bool refine = true;           ///< least squares on the inliers of what converged

@@ -1,4 +1,4 @@
-// The costs of a swarm over stored points: every residual, or only those that can matter (design 2.3).
+// The costs of a swarm over stored points: every residual, or only those that can matter (see docs/method.md).
 #pragma once
 
 #include <cstdint>
