@@ -9,6 +9,8 @@ target_compile_options(swarmfit_compile_options INTERFACE
   -ffp-contract=off)
 if(SWARMFIT_SANITIZE)
   target_compile_options(swarmfit_compile_options INTERFACE
-    -fsanitize=${SWARMFIT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+    -fsanitize=${SWARMFIT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
+    # GCC 12 warns of std::regex under sanitizers, without cause.
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(swarmfit_compile_options INTERFACE -fsanitize=${SWARMFIT_SANITIZE})
 endif()
