@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -146,6 +147,18 @@ struct Centred {
   alignas(64) std::array<float, kBlockPoints> weight{};
 };
 
+/// In kStrands sums side by side, whatever the compiler makes of it: the rounding of each is at most kSumRounding of its terms' sizes.
+constexpr std::size_t kStrands = 16;
+constexpr float kSumRounding = kBlockPoints / kStrands * std::numeric_limits<float>::epsilon() / 2;
+float dot(const float* a, const float* b) {
+  std::array<float, kStrands> strand{};
+  for (std::size_t i = 0; i < kBlockPoints; i += kStrands) {
+#pragma omp simd
+    for (std::size_t s = 0; s < kStrands; ++s) strand[s] += a[i + s] * b[i + s];
+  }
+  return static_cast<float>(std::accumulate(strand.begin(), strand.end(), 0.0));
+}
+
 /// Fills all that needs no axes. The loops here are plain so that compilers turn them into vectors.
 void centre_block(const float* const* columns, const float* caps, std::size_t width, Centred& centred, BlockBounds& bounds) {
   constexpr float kNone = std::numeric_limits<float>::max();
@@ -169,20 +182,10 @@ void centre_block(const float* const* columns, const float* caps, std::size_t wi
     const float* column = columns[c];
     const float* weight = centred.weight.data();
     float* offset = centred.offset[c].data();
-    float sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (std::size_t i = 0; i < kBlockPoints; ++i) sum += weight[i] * column[i];
-    const float mean = bounds.mean[c] = sum / count;
+    const float mean = bounds.mean[c] = dot(weight, column) / count;
 #pragma omp simd
     for (std::size_t i = 0; i < kBlockPoints; ++i) offset[i] = weight[i] * (column[i] - mean);
   }
-}
-
-float dot(const float* a, const float* b) {
-  float sum = 0;
-#pragma omp simd reduction(+ : sum)
-  for (std::size_t i = 0; i < kBlockPoints; ++i) sum += a[i] * b[i];
-  return sum;
 }
 
 /// The box and the signed sums along one axis, of unit length.
@@ -204,7 +207,7 @@ void bound_axis(const Centred& centred, const std::array<float, 3>& axis, double
     bounds.signed_offset[e][c] = dot(sign.data(), centred.offset[c].data());
   }
   const double square = static_cast<double>(reach) * static_cast<double>(reach);
-  bounds.spread[e] = square > 0 ? static_cast<float>(std::max(0.0, variance) / square) : 0.0F;
+  bounds.spread[e] = square > 0 ? static_cast<float>(variance / square) : 0.0F;
   bounds.sign_sum[e] = signs;
 }
 
@@ -224,9 +227,11 @@ BlockBounds bound_block(const float* const* columns, const float* caps, int dime
     }
   }
   diagonalise(covariance, axes, dimension);
+  // What the sums above and the axes' own rounding may have added to the variance in any direction; it may well make one negative.
+  const double rounding = 4.0 * static_cast<double>(kSumRounding) * (covariance[0][0] + covariance[1][1] + covariance[2][2]);
   for (std::size_t e = 0; e < width; ++e) {
     const std::array<float, 3> axis{static_cast<float>(axes[0][e]), static_cast<float>(axes[1][e]), static_cast<float>(axes[2][e])};
-    bound_axis(centred, axis, covariance[e][e], width, e, bounds);
+    bound_axis(centred, axis, covariance[e][e] - rounding, width, e, bounds);
   }
   return bounds;
 }

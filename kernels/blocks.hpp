@@ -33,7 +33,7 @@ struct BlockBounds {
   float count = 0;  ///< points with a cap > 0
   float mean[3] = {};
   float axis[3][3] = {};  ///< principal axes, each as long as the box's half extent about the mean
-  float spread[3] = {};   ///< variance along the axis over the square of its length
+  float spread[3] = {};   ///< variance along the axis, less its rounding, over the square of its length
   float least_cap = 0;    ///< of caps > 0
   float most_cap = -std::numeric_limits<float>::infinity();
   float cap_sum = 0;

@@ -268,7 +268,7 @@ struct BlockBounder {
       for (std::size_t s = 0; s < D; ++s) {
         sum = hn::Max(sum, hn::Abs(hn::MulAdd(load(Field::sign_sum + s), middle, dot(k, Field::signed_offset + 3 * s))));
       }
-      sum = hn::Mul(hn::NegMulAdd(count, slack, sum), share);
+      sum = hn::Mul(hn::NegMulAdd(hn::Add(count, count), slack, sum), share);
       least = hn::Max(sum, hn::Mul(load(Field::cap_sum), cap_share));
     } else {
       const BlockVector rounding = hn::Mul(hn::Mul(hn::Set(d, 2.0F), hn::Mul(slack, farthest)), count);

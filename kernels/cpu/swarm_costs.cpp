@@ -124,8 +124,8 @@ void SwarmCosts::bound_all(const PointStore& points, const CentredSwarm& swarm, 
   const auto dimension = static_cast<std::size_t>(points.dimension());
   slack_.resize(swarm.count);
   for (std::size_t j = 0; j < swarm.count; ++j) {
-    // Of a sum of dimension + 1 products in float, here and in the residuals.
-    constexpr float kRounding = 1e-6F;
+    // Of a sum of dimension + 1 products in float, here and in the residuals, and of the blocks' means.
+    constexpr float kRounding = 2e-6F;
     float size = std::abs(swarm.coefficients[j * width + dimension]);
     for (std::size_t c = 0; c < dimension; ++c) size += std::abs(swarm.coefficients[j * width + c]) * points.reach()[c];
     slack_[j] = std::min(kRounding * size, 1e30F) + std::numeric_limits<float>::min();
