@@ -314,6 +314,32 @@ TEST(FitOptions, EachBoundIsChecked) {
   EXPECT_NE(message([](FitOptions& o) { o.prior = DirectionPrior{Eigen::Vector3d::UnitX(), 0}; }), "");
 }
 
+TEST(Fitter, OptionsMayChangeOnTheSameBackEnd) {
+  FitOptions options;
+  options.backend = "cpu";
+  options.threads = 1;
+  auto fitter = Fitter::create(options);
+  ASSERT_TRUE(fitter);
+  options.prior = DirectionPrior{Eigen::Vector3d::UnitZ(), 0.1};
+  options.seed = 7;
+  ASSERT_TRUE(fitter->set_options(options));
+  EXPECT_EQ(fitter->options().seed, 7u);
+  EXPECT_TRUE(fitter->options().prior.has_value());
+  FitOptions other = options;
+  other.backend = "reference";
+  auto refused = fitter->set_options(other);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, Error::Kind::invalid_option);
+  EXPECT_NE(refused.error().message.find("must stay cpu"), std::string::npos);
+  other = options;
+  other.threads = 2;
+  EXPECT_FALSE(fitter->set_options(other));
+  other = options;
+  other.particles = -1;
+  EXPECT_FALSE(fitter->set_options(other));
+  EXPECT_EQ(fitter->options().seed, 7u) << "what was refused changes nothing";
+}
+
 TEST(Fitter, AnUnknownBackEndIsAnErrorThatListsWhatThereIs) {
   FitOptions options;
   options.backend = "quantum";

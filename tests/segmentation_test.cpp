@@ -139,7 +139,7 @@ PottsEnergy::Cost plain_energy(const Grid& grid, const std::vector<PottsEnergy::
 TEST(GraphCut, OneExpansionIsTheBestOfAllSubsets) {
   Random random(3);
   for (int trial = 0; trial < 200; ++trial) {
-    const Grid grid = random_grid(random, 3, 3, 3);
+    Grid grid = random_grid(random, 3, 3, 3);
     std::vector<PottsEnergy::Label> start(9);
     for (auto& label : start) label = static_cast<PottsEnergy::Label>(random.below(3));
     for (PottsEnergy::Label alpha = 0; alpha < 3; ++alpha) {
@@ -163,7 +163,7 @@ TEST(GraphCut, MinimisingEndsWithinTwiceTheOptimum) {
   Random random(4);
   int exact = 0;
   for (int trial = 0; trial < 60; ++trial) {
-    const Grid grid = random_grid(random, 4, 2, 3);
+    Grid grid = random_grid(random, 4, 2, 3);
     PottsEnergy::Cost best = std::numeric_limits<PottsEnergy::Cost>::max();
     for (int code = 0; code < 6561; ++code) {
       std::vector<PottsEnergy::Label> labels;
@@ -172,7 +172,8 @@ TEST(GraphCut, MinimisingEndsWithinTwiceTheOptimum) {
     }
     auto labels = grid.energy.cheapest();
     const PottsEnergy::Label order[] = {0, 1, 2};
-    const auto found = grid.energy.minimise(order, 10, labels);
+    const auto start = plain_energy(grid, labels);
+    const auto found = start - grid.energy.minimise(order, 10, labels);
     EXPECT_EQ(found, plain_energy(grid, labels));
     EXPECT_LE(found, 2 * best) << "the bound of alpha-expansion for Potts energies";
     exact += found == best;
@@ -182,7 +183,7 @@ TEST(GraphCut, MinimisingEndsWithinTwiceTheOptimum) {
 
 TEST(GraphCut, TheEnergyNeverRises) {
   Random random(5);
-  const Grid grid = random_grid(random, 40, 30, 5);
+  Grid grid = random_grid(random, 40, 30, 5);
   auto labels = grid.energy.cheapest();
   auto energy = plain_energy(grid, labels);
   for (int step = 0; step < 25; ++step) {
@@ -190,6 +191,45 @@ TEST(GraphCut, TheEnergyNeverRises) {
     EXPECT_GE(fall, 0);
     EXPECT_EQ(plain_energy(grid, labels), energy - fall);
     energy -= fall;
+  }
+}
+
+TEST(GraphCut, PiecesAreMinimisedAloneByAnyNumberOfThreads) {
+  Random random(6);
+  PottsEnergy together;
+  std::vector<PottsEnergy> alone(12);
+  for (auto& energy : alone) {
+    const int first = static_cast<int>(together.nodes());
+    for (int i = 0; i < 30; ++i) {
+      for (PottsEnergy* e : {&energy, &together}) e->add_node();
+      for (PottsEnergy::Label l = 0; l < 4; ++l) {
+        const int cost = random.below(20);
+        for (PottsEnergy* e : {&energy, &together}) e->add_label(l, cost);
+      }
+      if (i == 0) continue;
+      for (const int j : {i - 1, std::max(0, i - 7)}) {
+        const int weight = random.below(15);
+        energy.add_edge(j, i, weight);
+        together.add_edge(first + j, first + i, weight);
+      }
+    }
+  }
+  together.close();
+  const PottsEnergy::Label order[] = {0, 1, 2, 3};
+  std::vector<PottsEnergy::Label> expected;
+  for (auto& energy : alone) {
+    energy.close();
+    auto labels = energy.cheapest();
+    energy.minimise(order, 10, labels);
+    expected.insert(expected.end(), labels.begin(), labels.end());
+  }
+  for (const int threads : {1, 2, 0}) {
+    auto labels = together.cheapest();
+    const auto before = together.energy(labels);
+    const auto fall = together.minimise(order, 10, labels, threads);
+    EXPECT_EQ(labels, expected) << threads;
+    EXPECT_EQ(before - fall, together.energy(labels));
+    EXPECT_GT(fall, 0);
   }
 }
 
@@ -204,7 +244,8 @@ TEST(GraphCut, KeepsToTheLabelsANodeMayTake) {
   energy.close();
   auto labels = energy.cheapest();
   const PottsEnergy::Label order[] = {1, 2, 7, 9};
-  EXPECT_EQ(energy.minimise(order, 5, labels), 105);
+  EXPECT_EQ(energy.energy(labels), 105);
+  EXPECT_EQ(energy.minimise(order, 5, labels), 0);
   EXPECT_EQ(labels, (std::vector<PottsEnergy::Label>{1, 2}));
 }
 

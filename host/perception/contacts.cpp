@@ -12,6 +12,8 @@ constexpr int kInside = 4;             // [cells] from the border to where a pat
 constexpr double kFlat = 0.26;         // [rad] patches that meet at less go on in one another
 constexpr double kCrease = 0.52;       // [rad] a concave edge that counts in full
 constexpr double kCreaseWeight = 1.5;  // against 1 of a convex edge: two things touch along short borders
+constexpr float kUnbroken = 4;         // footprints between neighbouring cells of one surface at most
+constexpr double kRim = 30;            // [rad / m] convex, and bent more than this
 constexpr double kStepWeight = 0.5;
 constexpr double kStepSigmas = 4;
 constexpr int kReach = 6;        // [cells] holes between patches may be this wide
@@ -29,6 +31,22 @@ std::size_t step_inside(const CoarseGrid& coarse, const Patches& patches, int u,
     inside = at;
   }
   return inside;
+}
+
+/// The place `steps` cells on from `start`, if the surface goes on so far without a break.
+std::size_t follow_surface(const PointGrid& grid, const CoarseGrid& coarse, std::size_t start, int du, int dv, int steps) {
+  int x = static_cast<int>(start) % coarse.width, y = static_cast<int>(start) / coarse.width;
+  std::size_t at = start;
+  for (int k = 1; k <= steps; ++k) {
+    x += du;
+    y += dv;
+    if (x < 0 || y < 0 || x >= coarse.width || y >= coarse.height) break;
+    const auto to = static_cast<std::size_t>(y * coarse.width + x);
+    const float reach = kUnbroken * coarse.footprint(at, grid.pitch);
+    if (coarse.group[to] != coarse.group[start] || (coarse.points[to] - coarse.points[at]).squaredNorm() > reach * reach) break;
+    at = to;
+  }
+  return at;
 }
 
 /// Unit normal of a cell, or its patch's where the cell has none.
@@ -72,10 +90,16 @@ double vote(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patc
   const Eigen::Vector3f d = coarse.points[a] - coarse.points[b];
   if (angle < kFlat || (na - nb).dot(d) > 0) return 1;
   // Concave. What both sides bend by anyway is no crease.
-  const auto a2 = step_inside(coarse, patches, border.u, border.v, -du, -dv, 2 * kInside);
-  const auto b2 = step_inside(coarse, patches, border.x, border.y, du, dv, 2 * kInside);
-  const double bent = (hollowness(coarse, patches, a, a2) + hollowness(coarse, patches, b, b2)) / 2;
-  const double crease = angle - std::max(0.0, bent) * static_cast<double>(d.norm());
+  const auto a2 = follow_surface(grid, coarse, a, -du, -dv, kInside);
+  const auto b2 = follow_surface(grid, coarse, b, du, dv, kInside);
+  double bent = 0, known = 0;
+  for (const auto& [from, to_end] : {std::pair{a, a2}, std::pair{b, b2}}) {
+    const double hollow = hollowness(coarse, patches, from, to_end);
+    if (from == to_end || hollow < -kRim) continue;  // too short, or over a rim: that side does not tell
+    bent += std::max(0.0, hollow);
+    ++known;
+  }
+  const double crease = angle - (known > 0 ? bent / known : 0) * static_cast<double>(d.norm());
   return crease < kFlat ? 1 : -kCreaseWeight * std::min(1.0, crease / kCrease);
 }
 

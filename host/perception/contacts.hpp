@@ -15,6 +15,7 @@ struct GroupingOptions {
   double flood_step = 0.02;                       ///< [m]
   double noise = 0.0015;                          ///< standard deviation of a depth at a range of one metre [m]
   Eigen::Vector3f up = Eigen::Vector3f::UnitZ();  ///< against gravity
+  int threads = 0;                                ///< 0: as many as there are
 };
 
 struct Contact {

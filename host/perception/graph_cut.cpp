@@ -1,24 +1,29 @@
 #include "host/perception/graph_cut.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <atomic>
 #include <numeric>
+#include <utility>
 
-// The graph of OpenCV's grabCut; it takes its includes from whoever includes it.
-#include <opencv2/core.hpp>
-#include <opencv2/imgproc/detail/gcgraph.hpp>
+#include "host/perception/parallel.hpp"
 
 namespace swarmfit::perception {
+
+void PottsEnergy::reserve(std::size_t nodes, std::size_t labels, std::size_t edges) {
+  first_.reserve(nodes);
+  choices_.reserve(labels);
+  edges_.reserve(edges);
+}
 
 int PottsEnergy::add_node() {
   first_.push_back(choices_.size());
   return static_cast<int>(first_.size()) - 1;
 }
 
-void PottsEnergy::add_label(Label label, Cost cost) { choices_.push_back({label, cost}); }
+void PottsEnergy::add_label(Label label, Cost cost) { choices_.push_back({label, static_cast<std::int32_t>(cost)}); }
 
 void PottsEnergy::add_edge(int i, int j, Cost weight) {
-  if (weight > 0 && i != j) edges_.push_back({i, j, weight});
+  if (weight > 0 && i != j) edges_.push_back({i, j, static_cast<std::int32_t>(weight)});
 }
 
 std::span<const PottsEnergy::Choice> PottsEnergy::choices(std::size_t node) const {
@@ -50,101 +55,188 @@ std::vector<PottsEnergy::Label> PottsEnergy::cheapest() const {
 }
 
 void PottsEnergy::close() {
+  role_.assign(nodes(), Role::fixed);
+  make_graph();
+  find_pieces();
+}
+
+void PottsEnergy::make_graph() {
+  std::vector<std::int32_t> first(nodes() + 1, 0);
+  for (const Edge& e : edges_) {
+    ++first[static_cast<std::size_t>(e.i) + 1];
+    ++first[static_cast<std::size_t>(e.j) + 1];
+  }
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::vector<std::int32_t> next(first.begin(), first.end() - 1);
+  std::vector<CutGraph::Arc> arcs(2 * edges_.size());
+  weight_.resize(arcs.size());
+  for (const Edge& e : edges_) {
+    const std::int32_t there = next[static_cast<std::size_t>(e.i)]++, back = next[static_cast<std::size_t>(e.j)]++;
+    arcs[static_cast<std::size_t>(there)] = {e.j, back};
+    arcs[static_cast<std::size_t>(back)] = {e.i, there};
+    weight_[static_cast<std::size_t>(there)] = weight_[static_cast<std::size_t>(back)] = e.weight;
+  }
+  graph_ = CutGraph(std::move(first), std::move(arcs));
+}
+
+void PottsEnergy::find_pieces() {
+  pieces_.clear();
   takers_.clear();
-  for (std::size_t i = 0; i < nodes(); ++i)
-    for (const Choice& choice : choices(i)) takers_[choice.label].push_back({static_cast<int>(i), choice.cost});
-  first_neighbour_.assign(nodes() + 1, 0);
-  for (const Edge& e : edges_) {
-    ++first_neighbour_[static_cast<std::size_t>(e.i) + 1];
-    ++first_neighbour_[static_cast<std::size_t>(e.j) + 1];
-  }
-  std::partial_sum(first_neighbour_.begin(), first_neighbour_.end(), first_neighbour_.begin());
-  neighbours_.resize(2 * edges_.size());
-  std::vector<std::size_t> next(first_neighbour_.begin(), first_neighbour_.end() - 1);
-  for (const Edge& e : edges_) {
-    neighbours_[next[static_cast<std::size_t>(e.i)]++] = {e.j, e.weight};
-    neighbours_[next[static_cast<std::size_t>(e.j)]++] = {e.i, e.weight};
-  }
-}
-
-std::span<const PottsEnergy::Neighbour> PottsEnergy::neighbours(std::size_t node) const {
-  return std::span(neighbours_).subspan(first_neighbour_[node], first_neighbour_[node + 1] - first_neighbour_[node]);
-}
-
-PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) const {
-  const auto takers = takers_.find(alpha);
-  if (takers == takers_.end()) return 0;
-  // Who may change: a vertex of the graph each. x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha.
-  std::vector<int> vertex(nodes(), -1);
-  std::vector<std::size_t> node;
-  std::vector<Cost> keep, take;
-  std::size_t degrees = 0;
-  for (const Taker& taker : takers->second) {
-    const auto i = static_cast<std::size_t>(taker.node);
-    if (labels[i] == alpha) continue;
-    vertex[i] = static_cast<int>(node.size());
-    node.push_back(i);
-    keep.push_back(find(i, labels[i])->cost);
-    take.push_back(taker.cost);
-    degrees += neighbours(i).size();
-  }
-  if (node.empty()) return 0;
-  Cost fall = 0;  // of the nodes' own costs; the edges' share follows
-
-  cv::detail::GCGraph<Cost> graph(static_cast<unsigned>(node.size()), static_cast<unsigned>(degrees));
-  for (std::size_t k = 0; k < node.size(); ++k) graph.addVtx();
-  // Of several minimum cuts GCGraph may return a mixture that is none. A bias of one part in (vertices + 1) towards keeping leaves one cut
-  // only, and it is among the least of the unbiased ones.
-  const Cost scale = static_cast<Cost>(node.size()) + 1;
-  const std::vector<Cost> own_keep = keep, own_take = take;
-  bool connected = false;
-  for (std::size_t a = 0; a < node.size(); ++a)
-    for (const Neighbour& neighbour : neighbours(node[a])) {
-      const auto j = static_cast<std::size_t>(neighbour.node);
-      const Cost weight = neighbour.weight;
-      if (vertex[j] < 0) {  // the other end stands fixed
-        if (labels[node[a]] != labels[j]) keep[a] += weight;
-        if (alpha != labels[j]) take[a] += weight;
-        continue;
+  takers_.reserve(choices_.size());
+  std::vector<bool> met(nodes(), false);
+  std::vector<std::int32_t> inside;
+  for (std::size_t seed = 0; seed < nodes(); ++seed) {
+    if (met[seed]) continue;
+    inside.assign(1, static_cast<std::int32_t>(seed));
+    met[seed] = true;
+    for (std::size_t k = 0; k < inside.size(); ++k)
+      for (std::int32_t a = graph_.first_arc(inside[k]); a < graph_.last_arc(inside[k]); ++a) {
+        const std::int32_t j = graph_.arc(a).head;
+        if (met[static_cast<std::size_t>(j)]) continue;
+        met[static_cast<std::size_t>(j)] = true;
+        inside.push_back(j);
       }
-      const auto b = static_cast<std::size_t>(vertex[j]);
-      if (b < a) continue;  // seen from the other end
-      // E(0,0) = w [l_i != l_j], E(0,1) = E(1,0) = w, E(1,1) = 0, written as terminals and one edge (Kolmogorov and Zabih 2004).
-      const Cost both_keep = labels[node[a]] != labels[j] ? weight : 0;
-      take[a] += weight - both_keep;
-      keep[b] += weight;  // -w x_b, up to a constant
-      graph.addEdges(static_cast<int>(a), static_cast<int>(b), scale * (2 * weight - both_keep), 0);
-      connected = true;
-    }
-  for (std::size_t k = 0; k < node.size(); ++k) graph.addTermWeights(static_cast<int>(k), scale * take[k] + 1, scale * keep[k]);
-  if (connected) graph.maxFlow();
+    find_takers(inside, pieces_.emplace_back());
+  }
+  // The longest work first, so that threads end together.
+  std::stable_sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) { return a.nodes > b.nodes; });
+}
 
-  std::vector<bool> takes(node.size());
-  for (std::size_t k = 0; k < node.size(); ++k) takes[k] = connected ? !graph.inSourceSegment(static_cast<int>(k)) : take[k] < keep[k];
-  for (std::size_t k = 0; k < node.size(); ++k) {
-    if (takes[k]) fall += own_keep[k] - own_take[k];
-    for (const Neighbour& neighbour : neighbours(node[k])) {
-      const auto j = static_cast<std::size_t>(neighbour.node);
-      if (vertex[j] >= 0 && static_cast<std::size_t>(vertex[j]) < k) continue;
-      const Label mine = takes[k] ? alpha : labels[node[k]];
-      const Label other = vertex[j] >= 0 && takes[static_cast<std::size_t>(vertex[j])] ? alpha : labels[j];
-      fall += neighbour.weight * (static_cast<int>(labels[node[k]] != labels[j]) - static_cast<int>(mine != other));
+void PottsEnergy::find_takers(std::span<const std::int32_t> nodes, Piece& piece) {
+  piece.nodes = nodes.size();
+  const auto of_label = [&](Label label) {
+    return std::find_if(piece.takers.begin(), piece.takers.end(), [&](const Takers& t) { return t.label == label; });
+  };
+  // Counted first, then laid out label by label.
+  for (const std::int32_t i : nodes)
+    for (const Choice& choice : choices(static_cast<std::size_t>(i))) {
+      auto found = of_label(choice.label);
+      if (found == piece.takers.end()) found = piece.takers.insert(found, {choice.label, 0, 0, true});
+      ++found->last;
+    }
+  std::size_t first = takers_.size();
+  for (Takers& t : piece.takers) {
+    const std::size_t count = t.last;
+    t.first = t.last = first;
+    first += count;
+  }
+  takers_.resize(first);
+  for (const std::int32_t i : nodes)
+    for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[of_label(choice.label)->last++] = {i, choice.cost};
+}
+
+/// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. A pair costs w [l_i != l_j] at (0, 0), w at (0, 1) and (1, 0), nothing
+/// at (1, 1): half of the first on each end that keeps, and the rest on the edge (Kolmogorov and Zabih 2004). All counts twice, to stay whole.
+void PottsEnergy::set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take,
+                                 std::span<const Label> labels) {
+  for (std::size_t k = 0; k < part.size(); ++k) {
+    const std::int32_t i = part[k];
+    const Label own = labels[static_cast<std::size_t>(i)];
+    std::int32_t gain = (take[k] - find(static_cast<std::size_t>(i), own)->cost);  // of keeping over taking
+    for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a) {
+      const auto [head, mate] = graph_.arc(a);
+      const auto j = static_cast<std::size_t>(head);
+      const std::int32_t weight = weight_[static_cast<std::size_t>(a)];
+      if (role_[j] == Role::fixed) {
+        gain += weight * (static_cast<int>(alpha != labels[j]) - static_cast<int>(own != labels[j]));
+        graph_.capacity(a) = graph_.capacity(mate) = 0;
+      } else {
+        const std::int32_t apart = own != labels[j] ? weight : 0;
+        gain += i < head ? weight - apart : -weight;
+        graph_.capacity(a) = i < head ? 2 * weight - apart : 0;
+      }
+    }
+    graph_.terminal(i) = gain;
+  }
+}
+
+PottsEnergy::Cost PottsEnergy::fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take,
+                                       std::span<const Label> labels) const {
+  Cost fall = 0;
+  for (std::size_t k = 0; k < part.size(); ++k) {
+    const std::int32_t i = part[k];
+    if (role_[static_cast<std::size_t>(i)] != Role::takes) continue;
+    const Label own = labels[static_cast<std::size_t>(i)];
+    fall += find(static_cast<std::size_t>(i), own)->cost - take[k];
+    for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a) {
+      const std::int32_t j = graph_.arc(a).head;
+      const Label other = labels[static_cast<std::size_t>(j)];
+      const bool both = role_[static_cast<std::size_t>(j)] == Role::takes;
+      if (both && j < i) continue;  // seen from the other end
+      fall += weight_[static_cast<std::size_t>(a)] * (static_cast<int>(own != other) - static_cast<int>(!both && alpha != other));
     }
   }
-  if (fall <= 0) return 0;
-  for (std::size_t k = 0; k < node.size(); ++k)
-    if (takes[k]) labels[node[k]] = alpha;
   return fall;
 }
 
-PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles, std::vector<Label>& labels) const {
-  std::size_t still = 0;  // expansions in a row that found nothing; after all of `order`, none can
-  for (int cycle = 0; cycle < cycles && still < order.size(); ++cycle)
-    for (const Label alpha : order) {
-      still = expand(alpha, labels) > 0 ? 1 : still + 1;
-      if (still >= order.size()) break;
+/// A node that took alpha is news to every other label that it or a neighbour may take.
+void PottsEnergy::make_stale(Piece& piece, std::size_t node, Label alpha) const {
+  const auto mark = [&](std::size_t i) {
+    for (const Choice& choice : choices(i))
+      for (Takers& t : piece.takers) t.stale = t.stale || (t.label == choice.label && t.label != alpha);
+  };
+  mark(node);
+  for (auto a = graph_.first_arc(static_cast<std::int32_t>(node)); a < graph_.last_arc(static_cast<std::int32_t>(node)); ++a)
+    mark(static_cast<std::size_t>(graph_.arc(a).head));
+}
+
+PottsEnergy::Cost PottsEnergy::expand(Piece& piece, const Takers& takers, std::vector<Label>& labels) {
+  const Label alpha = takers.label;
+  std::vector<std::int32_t> part, take;
+  part.reserve(takers.last - takers.first);
+  take.reserve(takers.last - takers.first);
+  for (std::size_t t = takers.first; t < takers.last; ++t) {
+    const auto i = static_cast<std::size_t>(takers_[t].node);
+    if (labels[i] == alpha) continue;
+    role_[i] = Role::may_take;
+    part.push_back(takers_[t].node);
+    take.push_back(takers_[t].cost);
+  }
+  set_capacities(part, alpha, take, labels);
+  graph_.cut(part);
+  for (const std::int32_t i : part)
+    if (graph_.at_sink(i)) role_[static_cast<std::size_t>(i)] = Role::takes;
+  const Cost fall = fall_of(part, alpha, take, labels);
+  for (const std::int32_t node : part) {
+    const auto i = static_cast<std::size_t>(node);
+    if (role_[i] == Role::takes && fall > 0) {
+      labels[i] = alpha;
+      make_stale(piece, i, alpha);
     }
-  return energy(labels);
+    role_[i] = Role::fixed;
+  }
+  return fall;
+}
+
+PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) {
+  Cost fall = 0;
+  for (Piece& piece : pieces_)
+    for (const Takers& takers : piece.takers)
+      if (takers.label == alpha) fall += expand(piece, takers, labels);
+  return fall;
+}
+
+PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles, std::vector<Label>& labels, int threads) {
+  std::atomic<Cost> fall = 0;  // whole numbers: the sum is the same in any order
+  in_parallel(static_cast<int>(pieces_.size()), 1, threads, [&](int first, int last) {
+    for (int k = first; k < last; ++k) {
+      Piece& piece = pieces_[static_cast<std::size_t>(k)];
+      for (Takers& takers : piece.takers) takers.stale = true;
+      bool still = false;
+      for (int cycle = 0; cycle < cycles && !still; ++cycle) {
+        still = true;
+        for (const Label alpha : order)
+          for (Takers& takers : piece.takers) {
+            if (takers.label != alpha || !takers.stale) continue;
+            takers.stale = false;
+            const Cost fell = expand(piece, takers, labels);
+            fall += fell;
+            still = still && fell == 0;
+          }
+      }
+    }
+  });
+  return fall;
 }
 
 }  // namespace swarmfit::perception

@@ -3,19 +3,22 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <span>
 #include <vector>
+
+#include "host/perception/min_cut.hpp"
 
 namespace swarmfit::perception {
 
 /// E(l) = sum_i cost_i(l_i) + sum_(i,j) w_ij [l_i != l_j]. Each node has its own list of labels it may take. Costs and weights are whole
-/// numbers, so that energies are exact; keep them below 2^24.
+/// numbers, so that energies are exact; a node's dearest label and all weights at it together must stay below 2^28.
 class PottsEnergy {
  public:
   using Label = std::uint16_t;
   using Cost = std::int64_t;
 
+  /// For so many nodes, labels over all nodes, and edges.
+  void reserve(std::size_t nodes, std::size_t labels, std::size_t edges);
   /// A new node; its labels follow by add_label before the next node.
   int add_node();
   /// The last node may take `label`, once each.
@@ -36,39 +39,53 @@ class PottsEnergy {
 
   /// The best labelling in which every node keeps its label or takes `alpha` (one minimum cut). Returns by how much the energy fell, >= 0;
   /// labels change only if it did.
-  Cost expand(Label alpha, std::vector<Label>& labels) const;
-  /// Expands each of `order` in turn, `cycles` times at most, until nothing changes. Returns the energy.
-  Cost minimise(std::span<const Label> order, int cycles, std::vector<Label>& labels) const;
+  Cost expand(Label alpha, std::vector<Label>& labels);
+  /// Expands each of `order` in turn, `cycles` times at most, until nothing changes. Returns by how much the energy fell. Pieces of the
+  /// graph that no edge connects are worked on side by side, by at most `threads` threads (0: as many as there are).
+  Cost minimise(std::span<const Label> order, int cycles, std::vector<Label>& labels, int threads = 0);
 
  private:
   struct Choice {
     Label label;
-    Cost cost;
+    std::int32_t cost;
   };
   struct Edge {
-    int i, j;
-    Cost weight;
-  };
-  struct Neighbour {
-    int node;
-    Cost weight;
+    std::int32_t i, j, weight;
   };
   struct Taker {
-    int node;
-    Cost cost;
+    std::int32_t node, cost;
   };
+  /// Who may take a label within one piece of the graph.
+  struct Takers {
+    Label label;
+    std::size_t first, last;
+    bool stale;  ///< something has changed since the label was last expanded
+  };
+  struct Piece {
+    std::size_t nodes = 0;
+    std::vector<Takers> takers;
+  };
+  enum class Role : std::uint8_t { fixed, may_take, takes };
 
   std::span<const Choice> choices(std::size_t node) const;
-  std::span<const Neighbour> neighbours(std::size_t node) const;
   const Choice* find(std::size_t node, Label label) const;
+  void make_graph();
+  void find_pieces();
+  void find_takers(std::span<const std::int32_t> nodes, Piece& piece);
+  Cost expand(Piece& piece, const Takers& takers, std::vector<Label>& labels);
+  void set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take, std::span<const Label> labels);
+  Cost fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take, std::span<const Label> labels) const;
+  void make_stale(Piece& piece, std::size_t node, Label alpha) const;
 
   std::vector<std::size_t> first_;  // of each node's choices
   std::vector<Choice> choices_;
   std::vector<Edge> edges_;
-  // Made by close(): who may take a label, and each node's neighbours, so that an expansion touches only those it concerns.
-  std::map<Label, std::vector<Taker>> takers_;
-  std::vector<std::size_t> first_neighbour_;
-  std::vector<Neighbour> neighbours_;
+  // Made by close().
+  CutGraph graph_;
+  std::vector<std::int32_t> weight_;  // one an arc
+  std::vector<Piece> pieces_;         // those with most nodes first
+  std::vector<Taker> takers_;
+  std::vector<Role> role_;  // one a node, within an expansion
 };
 
 }  // namespace swarmfit::perception

@@ -1,12 +1,16 @@
 #include "host/perception/grid.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
+
+#include "host/perception/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
 
 constexpr double kLargeCoordinate = 2000;  // [m] beyond this single precision is coarser than a depth sensor
+constexpr int kPointsAtOnce = 16384;       // of a range that one thread works on
 constexpr int kPitchStride = 8;            // [px] baseline over which the angle between pixels is measured
 
 /// Median angle between horizontal neighbours on the same surface.
@@ -28,29 +32,44 @@ float measure_pitch(const PointGrid& grid) {
 }
 
 template <class Scalar>
-void copy_points(const std::vector<Scalar>& values, PointGrid& grid) {
+bool is_finite(const Scalar* x) {
+  return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]);
+}
+
+template <class Scalar>
+void copy_points(const std::vector<Scalar>& values, int threads, PointGrid& grid) {
   const std::size_t count = values.size() / 3;
   grid.points.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
-    if (std::isfinite(values[3 * i]) && std::isfinite(values[3 * i + 1]) && std::isfinite(values[3 * i + 2])) {
-      const Eigen::Vector3d p(static_cast<double>(values[3 * i]), static_cast<double>(values[3 * i + 1]),
-                              static_cast<double>(values[3 * i + 2]));
-      if (grid.finite++ == 0 && p.cwiseAbs().maxCoeff() > kLargeCoordinate) grid.origin = p;
-      grid.points[i] = (p - grid.origin).cast<float>();
-    } else {
-      grid.points[i].setConstant(std::numeric_limits<float>::quiet_NaN());
-    }
+    const Scalar* x = &values[3 * i];
+    if (!is_finite(x)) continue;
+    const Eigen::Vector3d p(static_cast<double>(x[0]), static_cast<double>(x[1]), static_cast<double>(x[2]));
+    if (p.cwiseAbs().maxCoeff() > kLargeCoordinate) grid.origin = p;
+    break;
   }
+  std::atomic<std::size_t> finite = 0;
+  in_parallel(static_cast<int>(count), kPointsAtOnce, threads, [&](int first, int last) {
+    std::size_t here = 0;
+    for (auto i = static_cast<std::size_t>(first); i < static_cast<std::size_t>(last); ++i) {
+      const Scalar* x = &values[3 * i];
+      const bool good = is_finite(x);
+      here += good ? 1 : 0;
+      for (int k = 0; k < 3; ++k)
+        grid.points[i][k] = good ? static_cast<float>(static_cast<double>(x[k]) - grid.origin[k]) : std::numeric_limits<float>::quiet_NaN();
+    }
+    finite += here;
+  });
+  grid.finite = finite;
 }
 
 }  // namespace
 
-PointGrid make_grid(const Cloud& frame) {
+PointGrid make_grid(const Cloud& frame, int threads) {
   PointGrid grid;
   if (frame.values64.empty())
-    copy_points(frame.values32, grid);
+    copy_points(frame.values32, threads, grid);
   else
-    copy_points(frame.values64, grid);
+    copy_points(frame.values64, threads, grid);
   grid.width = frame.organised() ? frame.width : static_cast<int>(grid.points.size());
   grid.height = frame.organised() ? frame.height : 1;
   if (grid.organised()) grid.pitch = measure_pitch(grid);

@@ -34,6 +34,6 @@ struct LocalPlane {
   float height(const Eigen::Vector3f& p) const noexcept { return normal.dot(p) + offset; }
 };
 
-PointGrid make_grid(const Cloud& frame);
+PointGrid make_grid(const Cloud& frame, int threads = 0);
 
 }  // namespace swarmfit::perception

@@ -6,26 +6,55 @@
 #include <map>
 #include <numeric>
 
+#include "host/perception/parallel.hpp"
+
 namespace swarmfit::perception {
 namespace {
 
 constexpr double kIslandShare = 0.9;  // of an island's border that one object holds
 constexpr int kIslandReach = 5;       // [cells] holes between an island and what encloses it
 constexpr int kIslandCells = 12;      // smaller ones are noise
+constexpr int kRowsAtOnce = 16;       // that one thread works on
+constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+
+/// Which object each cell belongs to, and where that is clear for all of its points.
+struct CellObjects {
+  std::vector<std::uint16_t> object;
+  std::vector<std::uint8_t> settled;  ///< 1 where no other object and no other group lies around
+};
+
+CellObjects objects_of_cells(const CoarseGrid& coarse, const Patches& patches, const Objects& objects) {
+  CellObjects cells;
+  cells.object.assign(patches.label.size(), 0);
+  for (std::size_t at = 0; at < cells.object.size(); ++at)
+    if (patches.label[at] != 0) cells.object[at] = static_cast<std::uint16_t>(objects.of_patch[patches.label[at] - 1u] + 1);
+  cells.settled.assign(cells.object.size(), 0);
+  for (int v = 1; v + 1 < coarse.height; ++v)
+    for (int u = 1; u + 1 < coarse.width; ++u) {
+      const auto at = static_cast<std::size_t>(v * coarse.width + u), width = static_cast<std::size_t>(coarse.width);
+      bool same = cells.object[at] != 0;
+      for (const std::size_t row : {at - width, at, at + width})
+        for (const std::size_t to : {row - 1, row, row + 1}) same = same && cells.object[to] == cells.object[at];
+      cells.settled[at] = same;
+    }
+  return cells;
+}
 
 /// Object of the nearest cell around the point's own, in space; among cells of the point's group.
-std::uint16_t nearest_object(const CoarseGrid& coarse, const std::vector<std::uint16_t>& object, const Eigen::Vector3f& p,
-                             std::uint16_t group, int cu, int cv) {
+std::uint16_t nearest_object(const CoarseGrid& coarse, const CellObjects& cells, const Eigen::Vector3f& p, std::uint16_t group, int cu,
+                             int cv) {
+  const auto own = static_cast<std::size_t>(cv * coarse.width + cu);
+  if (cells.settled[own] != 0 && coarse.group[own] == group) return cells.object[own];
   float nearest = std::numeric_limits<float>::max();
   std::uint16_t found = 0;
   for (int v = std::max(0, cv - 1); v <= std::min(coarse.height - 1, cv + 1); ++v)
     for (int u = std::max(0, cu - 1); u <= std::min(coarse.width - 1, cu + 1); ++u) {
       const auto at = static_cast<std::size_t>(v * coarse.width + u);
-      if (object[at] == 0 || coarse.group[at] != group) continue;
+      if (cells.object[at] == 0 || coarse.group[at] != group) continue;
       const float distance = (coarse.points[at] - p).squaredNorm();
       if (distance >= nearest) continue;
       nearest = distance;
-      found = object[at];
+      found = cells.object[at];
     }
   return found;
 }
@@ -78,19 +107,21 @@ Thumbnail shrink(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
   thumb.stride = std::max(1, grid.width / 320);
   thumb.width = grid.width / thumb.stride;
   thumb.height = grid.height / thumb.stride;
+  thumb.object.resize(static_cast<std::size_t>(thumb.width) * static_cast<std::size_t>(thumb.height));
+  thumb.support.resize(thumb.object.size());
+  std::size_t at = 0;
   for (int v = 0; v < thumb.height; ++v)
-    for (int u = 0; u < thumb.width; ++u) {
+    for (int u = 0; u < thumb.width; ++u, ++at) {
       const auto i =
           static_cast<std::size_t>(v * thumb.stride) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u * thumb.stride);
-      thumb.object.push_back(objects.of_point[i]);
-      thumb.support.push_back(objects.of_point[i] == 0 && on_support[i] != 0);
+      thumb.object[at] = objects.of_point[i];
+      thumb.support[at] = objects.of_point[i] == 0 && on_support[i] != 0;
     }
   return thumb;
 }
 
 /// The object that encloses the island, or 0. `island` marks the island's cells with `mark`.
 std::uint16_t enclosing(const Thumbnail& thumb, const std::vector<int>& island, int mark, const std::vector<std::uint32_t>& cells) {
-  constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
   std::map<std::uint16_t, std::size_t> borders;  // 0: anything that is no object
   std::size_t total = 0;
   for (const auto at : cells) {
@@ -118,7 +149,7 @@ std::uint16_t enclosing(const Thumbnail& thumb, const std::vector<int>& island, 
 }  // namespace
 
 ObjectLabels separate(const PointGrid& grid, const Popout& popout, const GroupingOptions& options) {
-  const auto coarse = make_coarse_grid(grid, popout);
+  const auto coarse = make_coarse_grid(grid, popout, options.threads);
   const auto patches = grow_patches(coarse, grid.pitch);
   const auto objects = group_patches(grid, coarse, patches, options);
   ObjectLabels labels;
@@ -126,16 +157,17 @@ ObjectLabels separate(const PointGrid& grid, const Popout& popout, const Groupin
   for (std::size_t k = 0; k < patches.list.size(); ++k)
     if (patches.list[k].cells > 0)
       labels.support[static_cast<std::size_t>(objects.of_patch[k])] = popout.support[patches.list[k].group - 1u];
-  std::vector<std::uint16_t> of_cell(patches.label.size(), 0);
-  for (std::size_t at = 0; at < of_cell.size(); ++at)
-    if (patches.label[at] != 0) of_cell[at] = static_cast<std::uint16_t>(objects.of_patch[patches.label[at] - 1u] + 1);
+  const auto cells = objects_of_cells(coarse, patches, objects);
   labels.of_point.assign(grid.size(), 0);
-  for (std::size_t i = 0; i < grid.size(); ++i) {
-    if (popout.group[i] == 0) continue;
-    const int cu = std::min(coarse.width - 1, static_cast<int>(i % static_cast<std::size_t>(grid.width)) / coarse.stride);
-    const int cv = std::min(coarse.height - 1, static_cast<int>(i / static_cast<std::size_t>(grid.width)) / coarse.stride);
-    labels.of_point[i] = nearest_object(coarse, of_cell, grid.points[i], popout.group[i], cu, cv);
-  }
+  in_parallel(grid.height, kRowsAtOnce, options.threads, [&](int first, int last) {
+    for (int v = first; v < last; ++v)
+      for (int u = 0; u < grid.width; ++u) {
+        const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
+        if (popout.group[i] == 0) continue;
+        const int cu = std::min(coarse.width - 1, u / coarse.stride), cv = std::min(coarse.height - 1, v / coarse.stride);
+        labels.of_point[i] = nearest_object(coarse, cells, grid.points[i], popout.group[i], cu, cv);
+      }
+  });
   return labels;
 }
 
@@ -153,25 +185,29 @@ void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
     cells.assign(1, static_cast<std::uint32_t>(seed));
     for (std::size_t next = 0; next < cells.size(); ++next) {
       const int u0 = static_cast<int>(cells[next]) % thumb.width, v0 = static_cast<int>(cells[next]) / thumb.width;
-      for (int v = std::max(0, v0 - 1); v <= std::min(thumb.height - 1, v0 + 1); ++v)
-        for (int u = std::max(0, u0 - 1); u <= std::min(thumb.width - 1, u0 + 1); ++u) {
-          const auto to = static_cast<std::size_t>(v * thumb.width + u);
-          if (thumb.support[to] == 0 || island[to] != 0) continue;
-          island[to] = islands;
-          cells.push_back(static_cast<std::uint32_t>(to));
-        }
+      for (const auto& [du, dv] : kAround) {
+        const int u = u0 + du, v = v0 + dv;
+        if (u < 0 || v < 0 || u >= thumb.width || v >= thumb.height) continue;
+        const auto to = static_cast<std::size_t>(v * thumb.width + u);
+        if (thumb.support[to] == 0 || island[to] != 0) continue;
+        island[to] = islands;
+        cells.push_back(static_cast<std::uint32_t>(to));
+      }
     }
     if (static_cast<int>(cells.size()) < kIslandCells) continue;
     const auto object = enclosing(thumb, island, islands, cells);
     if (object == 0 || cells.size() > size[object]) continue;
     for (const auto at : cells) filled[at] = object;
   }
-  for (int v = 0; v < thumb.height * thumb.stride; ++v)
-    for (int u = 0; u < thumb.width * thumb.stride; ++u) {
-      const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
-      const auto object = filled[static_cast<std::size_t>((v / thumb.stride) * thumb.width + u / thumb.stride)];
-      if (object != 0 && objects.of_point[i] == 0 && on_support[i] != 0) objects.of_point[i] = object;
-    }
+  for (std::size_t at = 0; at < filled.size(); ++at) {
+    if (filled[at] == 0) continue;
+    const int u0 = static_cast<int>(at) % thumb.width * thumb.stride, v0 = static_cast<int>(at) / thumb.width * thumb.stride;
+    for (int v = v0; v < v0 + thumb.stride; ++v)
+      for (int u = u0; u < u0 + thumb.stride; ++u) {
+        const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
+        if (objects.of_point[i] == 0 && on_support[i] != 0) objects.of_point[i] = filled[at];
+      }
+  }
 }
 
 std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const int> models, std::size_t min_points, double margin,

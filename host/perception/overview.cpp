@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "host/perception/parallel.hpp"
+
 namespace swarmfit::perception {
 namespace {
 
@@ -13,11 +15,13 @@ constexpr int kBaseline = 4;         // [cells] over which a normal is taken
 constexpr float kBlockReach = 4.0f;  // points of a block are within this many footprints of its first: no mean across a depth edge
 constexpr int kEdgeReach = 2;        // [px]
 constexpr int kEdge = 15;            // sum of the three channels: below is noise
+constexpr int kRowsAtOnce = 16;      // of cells, that one thread works on
 constexpr float kBend = 0.3f;        // of the baseline's length: farther off its middle the surface bends
 
-void average_blocks(const PointGrid& grid, Overview& overview) {
+/// Rows [row, end) of cells.
+void average_blocks(const PointGrid& grid, int row, int end, Overview& overview) {
   auto& cells = overview.cells;
-  for (int cv = 0; cv < cells.height; ++cv)
+  for (int cv = row; cv < end; ++cv)
     for (int cu = 0; cu < cells.width; ++cu) {
       Eigen::Vector3f first = Eigen::Vector3f::Zero(), sum = Eigen::Vector3f::Zero();
       float count = 0, reach = 0;
@@ -37,7 +41,6 @@ void average_blocks(const PointGrid& grid, Overview& overview) {
         }
       if (count == 0) continue;
       cells.points[static_cast<std::size_t>(cv * cells.width + cu)] = sum / count;
-      ++cells.finite;
     }
 }
 
@@ -80,7 +83,7 @@ std::vector<std::uint8_t> find_texture(const Cloud& frame, const Overview& overv
 
 }  // namespace
 
-Overview make_overview(const PointGrid& grid, const Cloud& frame) {
+Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads) {
   Overview overview;
   if (!grid.organised()) {
     overview.cells = grid;
@@ -94,15 +97,18 @@ Overview make_overview(const PointGrid& grid, const Cloud& frame) {
   cells.pitch = grid.pitch * static_cast<float>(overview.stride);
   const auto count = static_cast<std::size_t>(cells.width) * static_cast<std::size_t>(cells.height);
   cells.points.assign(count, Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
-  average_blocks(grid, overview);
+  in_parallel(cells.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, first, last, overview); });
+  cells.finite = static_cast<std::size_t>(std::count_if(cells.points.begin(), cells.points.end(), PointGrid::seen));
   if (frame.passive_stereo && frame.coloured()) {
     overview.textured = find_texture(frame, overview);
     return overview;
   }
   overview.normals.assign(count, Eigen::Vector3f::Zero());
-  for (int v = kBaseline; v + kBaseline < cells.height; ++v)
-    for (int u = kBaseline; u + kBaseline < cells.width; ++u)
-      overview.normals[static_cast<std::size_t>(v * cells.width + u)] = normal_at(cells, u, v);
+  in_parallel(cells.height, kRowsAtOnce, threads, [&](int first, int last) {
+    for (int v = std::max(first, kBaseline); v < std::min(last, cells.height - kBaseline); ++v)
+      for (int u = kBaseline; u + kBaseline < cells.width; ++u)
+        overview.normals[static_cast<std::size_t>(v * cells.width + u)] = normal_at(cells, u, v);
+  });
   return overview;
 }
 

@@ -5,18 +5,22 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "host/perception/parallel.hpp"
+
 namespace swarmfit::perception {
 namespace {
 
 constexpr int kCoarseWidth = 320;     // [cells] fine enough for a cup's handle, coarse enough for a few milliseconds
 constexpr int kNormalRadius = 3;      // [cells]
 constexpr float kNormalReach = 2.2f;  // neighbours are within this many footprints times the radius: slanted faces are stretched
-constexpr std::size_t kFewNeighbours = 6;
+constexpr float kFewNeighbours = 6;
+constexpr int kRowsAtOnce = 8;           // of cells, that one thread works on
 constexpr float kSameFace = 0.93f;       // cosine between a cell's normal and its patch's mean: 21.6 degrees
 constexpr std::size_t kSmallPatch = 12;  // [cells]
 
-void average_blocks(const PointGrid& grid, const Popout& popout, CoarseGrid& coarse) {
-  for (int cv = 0; cv < coarse.height; ++cv)
+/// Rows [row, end) of cells.
+void average_blocks(const PointGrid& grid, const Popout& popout, int row, int end, CoarseGrid& coarse) {
+  for (int cv = row; cv < end; ++cv)
     for (int cu = 0; cu < coarse.width; ++cu) {
       const auto at = static_cast<std::size_t>(cv * coarse.width + cu);
       Eigen::Vector3f sum = Eigen::Vector3f::Zero(), first = Eigen::Vector3f::Zero();
@@ -44,21 +48,24 @@ void estimate_normal(CoarseGrid& coarse, int cu, int cv, float pitch) {
   const auto at = static_cast<std::size_t>(cv * coarse.width + cu);
   const auto& p = coarse.points[at];
   const float reach = kNormalReach * kNormalRadius * coarse.footprint(at, pitch);
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
-  std::size_t count = 0;
+  // Sums of the differences and of their products, component by component.
+  float count = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
+  const int first = std::max(0, cu - kNormalRadius), last = std::min(coarse.width - 1, cu + kNormalRadius);
   for (int v = std::max(0, cv - kNormalRadius); v <= std::min(coarse.height - 1, cv + kNormalRadius); ++v)
-    for (int u = std::max(0, cu - kNormalRadius); u <= std::min(coarse.width - 1, cu + kNormalRadius); ++u) {
+    for (int u = first; u <= last; ++u) {
       const auto to = static_cast<std::size_t>(v * coarse.width + u);
-      if (coarse.group[to] != coarse.group[at]) continue;
       const Eigen::Vector3f d = coarse.points[to] - p;
-      if (d.squaredNorm() > reach * reach) continue;
-      sum += d;
-      scatter.noalias() += d * d.transpose();
+      if (coarse.group[to] != coarse.group[at] || d.squaredNorm() > reach * reach) continue;
       ++count;
+      x += d.x(), y += d.y(), z += d.z();
+      xx += d.x() * d.x(), xy += d.x() * d.y(), xz += d.x() * d.z();
+      yy += d.y() * d.y(), yz += d.y() * d.z(), zz += d.z() * d.z();
     }
   if (count < kFewNeighbours) return;
-  scatter -= sum * sum.transpose() / static_cast<float>(count);
+  const Eigen::Vector3f sum(x, y, z);
+  Eigen::Matrix3f scatter;
+  scatter << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  scatter -= sum * sum.transpose() / count;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
   solver.computeDirect(scatter);
   Eigen::Vector3f n = solver.eigenvectors().col(0);
@@ -147,7 +154,7 @@ void describe(const CoarseGrid& coarse, Patches& patches) {
 
 }  // namespace
 
-CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout) {
+CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout, int threads) {
   CoarseGrid coarse;
   coarse.stride = std::max(1, (grid.width + kCoarseWidth / 2) / kCoarseWidth);
   coarse.width = grid.width / coarse.stride;
@@ -157,10 +164,12 @@ CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout) {
   coarse.normals.assign(cells, Eigen::Vector3f::Zero());
   coarse.variation.assign(cells, 1);
   coarse.group.assign(cells, 0);
-  average_blocks(grid, popout, coarse);
-  for (int v = 0; v < coarse.height; ++v)
-    for (int u = 0; u < coarse.width; ++u)
-      if (coarse.group[static_cast<std::size_t>(v * coarse.width + u)] != 0) estimate_normal(coarse, u, v, grid.pitch);
+  in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, popout, first, last, coarse); });
+  in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) {
+    for (int v = first; v < last; ++v)
+      for (int u = 0; u < coarse.width; ++u)
+        if (coarse.group[static_cast<std::size_t>(v * coarse.width + u)] != 0) estimate_normal(coarse, u, v, grid.pitch);
+  });
   return coarse;
 }
 

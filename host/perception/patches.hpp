@@ -31,7 +31,7 @@ struct Patches {
   std::vector<Patch> list;
 };
 
-CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout);
+CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout, int threads = 0);
 Patches grow_patches(const CoarseGrid& coarse, float pitch);
 
 }  // namespace swarmfit::perception

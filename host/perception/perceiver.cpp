@@ -47,11 +47,19 @@ std::size_t scaled_min_points(const PointGrid& grid, std::size_t min_soi_points)
   return std::max<std::size_t>(1, static_cast<std::size_t>(share * static_cast<double>(min_soi_points)));
 }
 
+/// By label: 1 where the model supports.
+std::vector<std::uint8_t> supporting_labels(const FitResult& fit) {
+  std::vector<std::uint8_t> supporting(1, 0);
+  for (const Model& model : fit.models) supporting.push_back(model.supporting ? 1 : 0);
+  return supporting;
+}
+
 /// A supporting plane does not keep what belongs to things that stand on it.
 void give_to_objects(const std::vector<std::uint16_t>& objects, FitResult& fit) {
+  const auto supporting = supporting_labels(fit);
   for (std::size_t i = 0; i < fit.labels.size(); ++i) {
     auto& label = fit.labels[i];
-    if (label == 0 || objects[i] == 0 || !fit.models[label - 1u].supporting) continue;
+    if (objects[i] == 0 || supporting[label] == 0) continue;
     --fit.models[label - 1u].inliers;
     label = 0;
   }
@@ -63,58 +71,44 @@ struct Perceiver::State {
   PerceiveOptions options;
   bool stereo = false;
   std::optional<perception::Vertical> vertical;
-  std::optional<Fitter> free_fitter;     ///< any plane, until the vertical is known
-  std::optional<Fitter> support_fitter;  ///< horizontal planes
+  std::optional<Fitter> fitter;  ///< of any plane until the vertical is known, then of horizontal ones
   std::optional<perception::Gallery> gallery;
 
-  Expected<> make_free_fitter();
-  Expected<> make_support_fitter();
+  FitOptions fit_options() const;
   Expected<> suit_sensor(const Cloud& frame);
   Expected<> find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                            PerceiveResult& result);
   void find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const;
 };
 
-Expected<> Perceiver::State::make_free_fitter() {
+FitOptions Perceiver::State::fit_options() const {
   FitOptions fit = options.fit;
-  fit.prior.reset();
-  fit.max_models = kPlanesOfFirstView;
-  auto made = Fitter::create(fit);
-  if (!made) return tl::unexpected(made.error());
-  free_fitter.emplace(std::move(*made));
-  return {};
+  if (!vertical) {
+    fit.prior.reset();
+    fit.max_models = kPlanesOfFirstView;
+    return fit;
+  }
+  // What is level in one room is level to each other; and without normals there is little else to tell a surface from clutter.
+  const bool narrow = stereo && !options.gravity && !options.camera_tilt;
+  const double angle = vertical->source == perception::kFromDominantPlane ? kStereoAngle : kStereoAngleFromWall;
+  fit.prior = DirectionPrior{vertical->up, narrow ? std::min(options.horizontal_angle, angle) : options.horizontal_angle};
+  return fit;
 }
 
 Expected<> Perceiver::State::suit_sensor(const Cloud& frame) {
   stereo = frame.passive_stereo;
   if (!frame.passive_stereo || options.fit.threshold || options.fit.estimate_threshold) return {};
   options.fit.threshold = kStereoThreshold;
-  if (vertical) return make_support_fitter();
-  return make_free_fitter();
-}
-
-Expected<> Perceiver::State::make_support_fitter() {
-  FitOptions fit = options.fit;
-  // What is level in one room is level to each other; and without normals there is little else to tell a surface from clutter.
-  const bool narrow = stereo && !options.gravity && !options.camera_tilt;
-  const double angle = vertical->source == perception::kFromDominantPlane ? kStereoAngle : kStereoAngleFromWall;
-  fit.prior = DirectionPrior{vertical->up, narrow ? std::min(options.horizontal_angle, angle) : options.horizontal_angle};
-  auto made = Fitter::create(fit);
-  if (!made) return tl::unexpected(made.error());
-  support_fitter.emplace(std::move(*made));
-  return {};
+  return fitter->set_options(fit_options());
 }
 
 Expected<> Perceiver::State::find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                                            PerceiveResult& result) {
   if (vertical) return {};
-  auto planes = perception::find_any_planes(*free_fitter, overview, stop);
+  auto planes = perception::find_any_planes(*fitter, overview, stop);
   if (!planes) return tl::unexpected(planes.error());
   vertical = perception::vertical_from_planes(grid, planes->models, options.horizontal_angle);
-  if (vertical) {
-    free_fitter.reset();
-    return make_support_fitter();
-  }
+  if (vertical) return fitter->set_options(fit_options());
   // Nothing flat in this view; the next one may have it.
   planes->models.clear();
   planes->labels.assign(grid.size(), 0);
@@ -127,15 +121,16 @@ void Perceiver::State::find_objects(const PointGrid& grid, const std::vector<Sur
   const auto min_points = scaled_min_points(grid, options.min_soi_points);
   // Debris beside a larger thing is part of it, a handle for example; so small groups are dropped after the grouping.
   const auto least_group = grid.organised() ? std::max<std::size_t>(1, min_points / 10) : min_points;
-  const auto popout = perception::pop_out(grid, supports, {options.min_height, options.max_height, options.flood_step, least_group});
+  const auto popout =
+      perception::pop_out(grid, supports, {options.min_height, options.max_height, options.flood_step, least_group, options.fit.threads});
   perception::ObjectLabels objects{popout.group, popout.support};
   if (grid.organised()) {
     double noise = 0;
     for (const auto& surface : supports) noise = std::max(noise, surface.noise);
-    objects = perception::separate(grid, popout, {options.flood_step, noise, result.up.cast<float>()});
-    std::vector<std::uint8_t> on_support(grid.size(), 0);
-    for (std::size_t i = 0; i < grid.size(); ++i)
-      on_support[i] = result.fit.labels[i] != 0 && result.fit.models[result.fit.labels[i] - 1u].supporting;
+    objects = perception::separate(grid, popout, {options.flood_step, noise, result.up.cast<float>(), options.fit.threads});
+    std::vector<std::uint8_t> on_support(grid.size());
+    const auto supporting = supporting_labels(result.fit);
+    for (std::size_t i = 0; i < grid.size(); ++i) on_support[i] = supporting[result.fit.labels[i]];
     perception::fill_basins(grid, on_support, objects);
   }
   std::vector<int> models;
@@ -155,11 +150,9 @@ Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) {
   state->options = options;
   if (options.gravity) state->vertical = perception::vertical_from_gravity(*options.gravity);
   if (options.camera_tilt) state->vertical = perception::vertical_from_tilt(*options.camera_tilt);
-  if (state->vertical) {
-    if (auto ok = state->make_support_fitter(); !ok) return tl::unexpected(ok.error());
-  } else {
-    if (auto ok = state->make_free_fitter(); !ok) return tl::unexpected(ok.error());
-  }
+  auto fitter = Fitter::create(state->fit_options());
+  if (!fitter) return tl::unexpected(fitter.error());
+  state->fitter.emplace(std::move(*fitter));
   if (!options.gallery.empty()) {
     auto loaded = perception::Gallery::load(options.gallery);
     if (!loaded) return tl::unexpected(loaded.error());
@@ -174,17 +167,17 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   Stopwatch whole, stage;
   PerceiveResult result;
   if (auto ok = state_->suit_sensor(frame); !ok) return tl::unexpected(ok.error());
-  const auto grid = perception::make_grid(frame);
+  const auto grid = perception::make_grid(frame, state_->options.fit.threads);
   if (grid.finite < 3)
     return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= 3 to perceive", grid.finite, frame.size()));
-  const auto overview = perception::make_overview(grid, frame);
+  const auto overview = perception::make_overview(grid, frame, state_->options.fit.threads);
   if (auto ok = state_->find_vertical(grid, overview, stop, result); !ok) return tl::unexpected(ok.error());
   result.vertical_source = state_->vertical ? state_->vertical->source : "dominant plane";
   result.popout.assign(frame.size(), 0);
   std::vector<Surface> supports;
   if (state_->vertical) {
     result.up = state_->vertical->up;
-    auto search = perception::find_supports(*state_->support_fitter, grid, overview, result.up, state_->options, on_plane, stop);
+    auto search = perception::find_supports(*state_->fitter, grid, overview, result.up, state_->options, on_plane, stop);
     if (!search) return tl::unexpected(search.error());
     result.fit = std::move(search->fit);
     supports = std::move(search->supports);

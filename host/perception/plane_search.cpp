@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/perception/parallel.hpp"
+
 namespace swarmfit::perception {
 namespace {
 
@@ -12,6 +14,7 @@ constexpr double kAgreement = 0.5;       // share of a plane's cells that lie al
 constexpr double kContrast = 2;          // of the density in a surface to that around it
 constexpr std::size_t kFewCells = 10;    // fewer flat cells hold no surface
 constexpr float kFringeOfPlane = 0.06f;  // [m] a surface reaches this far beyond the cells that tell its direction
+constexpr int kPointsAtOnce = 16384;     // of a range that one thread works on
 constexpr double kExtentMargin = 0.02;   // [m] things stand a little over the edge of what is seen of a table
 
 /// The cells as a cloud for the fitter.
@@ -79,11 +82,13 @@ std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vect
 Surface grow_surface(const Overview& overview, const std::vector<std::uint16_t>& labels, int model, const LocalPlane& plane, float tau) {
   const auto core = make_surface(overview.cells, labels, model, plane, kExtentMargin + static_cast<double>(kFringeOfPlane));
   if (!overview.has_normals() && overview.textured.empty()) return make_surface(overview.cells, labels, model, plane, kExtentMargin);
+  const auto beside = core.near_component(kFringeOfPlane);
   auto wider = labels;
   for (std::size_t i = 0; i < wider.size(); ++i) {
     const auto& p = overview.cells.points[i];
-    if (PointGrid::seen(p) && std::abs(plane.height(p)) <= tau && core.near_component(p, kFringeOfPlane))
-      wider[i] = static_cast<std::uint16_t>(model);
+    if (!PointGrid::seen(p) || std::abs(plane.height(p)) > tau) continue;
+    const int at = core.cell_of(p);
+    if (at >= 0 && beside[static_cast<std::size_t>(at)] != 0) wider[i] = static_cast<std::uint16_t>(model);
   }
   return make_surface(overview.cells, wider, model, plane, kExtentMargin);
 }
@@ -101,31 +106,56 @@ bool stands_out(const Overview& overview, const std::vector<std::uint32_t>& cell
   return static_cast<double>(within) > kContrast * static_cast<double>(around) / 2;
 }
 
-/// Labels, inliers, cost and rms over all points of the frame.
-void settle(const PointGrid& grid, const std::vector<Surface>& surfaces, FitResult& fit) {
-  const auto tau = static_cast<float>(fit.threshold);
-  std::vector<double> squares(surfaces.size(), 0), costs(surfaces.size(), 0);
-  fit.labels.assign(grid.size(), 0);
-  for (auto& model : fit.models) model.inliers = 0;
-  for (std::size_t i = 0; i < grid.size(); ++i) {
+/// What a range of points adds to one plane.
+struct Settled {
+  std::size_t inliers = 0;
+  double square = 0, saved = 0;  // of inliers' distances; of tau, by all points within it
+};
+
+std::vector<Settled> settle_range(const PointGrid& grid, const std::vector<Surface>& surfaces, float tau, std::size_t first,
+                                  std::size_t last, std::vector<std::uint16_t>& labels) {
+  std::vector<Settled> settled(surfaces.size());
+  for (std::size_t i = first; i < last; ++i) {
     const auto& p = grid.points[i];
-    if (!PointGrid::seen(p)) continue;
     float nearest = tau;
+    std::uint16_t label = 0;
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       const float distance = std::abs(surfaces[k].plane.height(p));
-      costs[k] += static_cast<double>(std::min(distance, tau));
+      if (!(distance <= tau)) continue;  // nor where nothing was seen
+      settled[k].saved += static_cast<double>(tau - distance);
       if (distance > nearest || !surfaces[k].on_component(p)) continue;
       nearest = distance;
-      fit.labels[i] = static_cast<std::uint16_t>(k + 1);
+      label = static_cast<std::uint16_t>(k + 1);
     }
-    if (fit.labels[i] == 0) continue;
-    ++fit.models[fit.labels[i] - 1u].inliers;
-    squares[fit.labels[i] - 1u] += static_cast<double>(nearest) * static_cast<double>(nearest);
+    labels[i] = label;
+    if (label == 0) continue;
+    ++settled[label - 1u].inliers;
+    settled[label - 1u].square += static_cast<double>(nearest) * static_cast<double>(nearest);
   }
+  return settled;
+}
+
+/// Labels, inliers, cost and rms over all points of the frame.
+void settle(const PointGrid& grid, const std::vector<Surface>& surfaces, int threads, FitResult& fit) {
+  const auto tau = static_cast<float>(fit.threshold);
+  const int count = static_cast<int>(grid.size());
+  fit.labels.assign(grid.size(), 0);
+  std::vector<std::vector<Settled>> parts(static_cast<std::size_t>((count + kPointsAtOnce - 1) / kPointsAtOnce));
+  in_parallel(count, kPointsAtOnce, threads, [&](int first, int last) {
+    parts[static_cast<std::size_t>(first / kPointsAtOnce)] =
+        settle_range(grid, surfaces, tau, static_cast<std::size_t>(first), static_cast<std::size_t>(last), fit.labels);
+  });
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
+    Settled sum;
+    for (const auto& part : parts) {
+      sum.inliers += part[k].inliers;
+      sum.square += part[k].square;
+      sum.saved += part[k].saved;
+    }
     auto& model = fit.models[k];
-    model.cost = costs[k];
-    model.rms = model.inliers == 0 ? 0 : std::sqrt(squares[k] / static_cast<double>(model.inliers));
+    model.inliers = sum.inliers;
+    model.cost = static_cast<double>(tau) * static_cast<double>(grid.finite) - sum.saved;
+    model.rms = model.inliers == 0 ? 0 : std::sqrt(sum.square / static_cast<double>(model.inliers));
   }
 }
 
@@ -214,7 +244,7 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
   std::vector<Surface> surfaces;
   for (std::size_t k = 0; k < planes.size(); ++k)
     surfaces.push_back(grow_surface(overview, labels, static_cast<int>(k + 1), planes[k], static_cast<float>(fit.threshold)));
-  settle(grid, surfaces, fit);
+  settle(grid, surfaces, options.fit.threads, fit);
   for (std::size_t k = 0; k < surfaces.size(); ++k)
     if (!overview.has_normals() && !stands_out(overview, flat, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;
   erase_models(fit, surfaces, static_cast<std::size_t>(options.min_plane_share * static_cast<double>(grid.finite)));

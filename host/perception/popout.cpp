@@ -5,6 +5,8 @@
 #include <limits>
 #include <unordered_map>
 
+#include "host/perception/parallel.hpp"
+
 namespace swarmfit::perception {
 namespace {
 
@@ -17,27 +19,32 @@ constexpr double kCutLength = 0.3;     // the same where it is seen to go on: it
 constexpr double kBorderShare = 0.8;   // of a group's points over the edge of the surface
 constexpr float kBorderLength = 0.4f;  // [m] shorter things at the edge are things
 constexpr int kMostSurfaces = 127;
+constexpr int kPointsAtOnce = 16384;  // of a range that one thread works on
 
-/// For each point the surface right below it, and the height above it.
-void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result) {
-  result.above.assign(grid.size(), -1);
-  result.height.assign(grid.size(), 0);
+/// For the points [first, last) the surface right below each, and the height above it.
+void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, std::size_t first,
+                      std::size_t last, Popout& result) {
   const auto count = std::min<std::size_t>(surfaces.size(), kMostSurfaces);
-  for (std::size_t i = 0; i < grid.size(); ++i) {
+  const auto least = static_cast<float>(options.min_height), most = static_cast<float>(options.max_height);
+  for (std::size_t i = first; i < last; ++i) {
     const auto& p = grid.points[i];
-    if (!PointGrid::seen(p)) continue;
-    float lowest = static_cast<float>(options.max_height);
+    float lowest = most;
     const float range2 = p.squaredNorm();
     for (std::size_t s = 0; s < count; ++s) {
       const float h = surfaces[s].plane.height(p);
+      if (!(h < lowest)) continue;  // nor where nothing was seen
       // Within the noise of a surface counts as on it, so that a board is not taken for an object on the board below.
-      const float fringe = std::min(static_cast<float>(options.min_height), kFringeSigmas * surfaces[s].sigma_at(range2));
-      if (h < -fringe || h >= lowest || (count == 1 && h <= fringe)) continue;
+      const float fringe = std::min(least, kFringeSigmas * surfaces[s].sigma_at(range2));
+      if (h < -fringe || (count == 1 && h <= fringe)) continue;
       if (!surfaces[s].contains(p)) continue;
       lowest = h;
       result.above[i] = h > fringe ? static_cast<std::int8_t>(s) : std::int8_t{-1};
       result.height[i] = h;
     }
+    if (result.above[i] < 0) continue;
+    // Without an image grid there is no range to go by.
+    const float noise = grid.organised() ? kSeedSigmas * surfaces[static_cast<std::size_t>(result.above[i])].sigma_at(range2) : 0;
+    result.sure[i] = result.height[i] >= std::max(least, noise);
   }
 }
 
@@ -54,12 +61,7 @@ class GridFlood {
           if (du != 0 || dv != 0) offsets_[static_cast<std::size_t>(k++)] = {du * step, dv * step};
   }
 
-  bool is_seed(std::size_t i) const {
-    if (result_.above[i] < 0) return false;
-    const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[i])];
-    return result_.height[i] >=
-           std::max(static_cast<float>(options_.min_height), kSeedSigmas * surface.sigma(PointGrid::range(grid_.points[i])));
-  }
+  bool is_seed(std::size_t i) const { return result_.sure[i] != 0; }
 
   /// Members of the group of `seed`, marked with `mark`.
   const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
@@ -104,12 +106,12 @@ class GridFlood {
 class VoxelFlood {
  public:
   VoxelFlood(const PointGrid& grid, const PopoutOptions& options, Popout& result)
-      : grid_(grid), options_(options), result_(result), step_(static_cast<float>(options.flood_step)) {
+      : grid_(grid), result_(result), step_(static_cast<float>(options.flood_step)) {
     for (std::size_t i = 0; i < grid.size(); ++i)
       if (is_seed(i)) voxels_[key(cell(grid.points[i]))].push_back(static_cast<std::uint32_t>(i));
   }
 
-  bool is_seed(std::size_t i) const { return result_.above[i] >= 0 && result_.height[i] >= static_cast<float>(options_.min_height); }
+  bool is_seed(std::size_t i) const { return result_.sure[i] != 0; }
 
   const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
     members_.assign(1, static_cast<std::uint32_t>(seed));
@@ -150,7 +152,6 @@ class VoxelFlood {
   }
 
   const PointGrid& grid_;
-  const PopoutOptions& options_;
   Popout& result_;
   float step_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> voxels_;
@@ -224,7 +225,12 @@ float flood_step_at(const PointGrid& grid, double noise, double flood_step, floa
 Popout pop_out(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options) {
   Popout result;
   result.group.assign(grid.size(), 0);
-  find_floor_below(grid, surfaces, options, result);
+  result.above.assign(grid.size(), -1);
+  result.height.assign(grid.size(), 0);
+  result.sure.assign(grid.size(), 0);
+  in_parallel(static_cast<int>(grid.size()), kPointsAtOnce, options.threads, [&](int first, int last) {
+    find_floor_below(grid, surfaces, options, static_cast<std::size_t>(first), static_cast<std::size_t>(last), result);
+  });
   if (grid.organised())
     collect(GridFlood(grid, surfaces, options, result), grid, surfaces, options, result);
   else

@@ -15,6 +15,7 @@ struct PopoutOptions {
   double max_height = 0.6;       ///< [m]
   double flood_step = 0.02;      ///< [m]
   std::size_t min_points = 300;  ///< of a group, at the cloud's own resolution
+  int threads = 0;               ///< 0: as many as there are
 };
 
 struct Popout {
@@ -23,6 +24,7 @@ struct Popout {
   std::vector<std::size_t> size;     ///< one a group
   std::vector<std::int8_t> above;    ///< one a point: -1, or the index of the surface it stands above (low fringe included)
   std::vector<float> height;         ///< one a point, above that surface [m]
+  std::vector<std::uint8_t> sure;    ///< one a point: 1 where it surely stands above that surface, and more can grow from it
 };
 
 /// Groups of points above `surfaces`, within their extent, up to the next surface and `max_height`.

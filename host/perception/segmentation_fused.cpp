@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
+#include <functional>
+#include <numeric>
 #include <optional>
 
 #include <Eigen/Eigenvalues>
 #include <opencv2/imgproc.hpp>
 
 #include "host/perception/graph_cut.hpp"
+#include "host/perception/parallel.hpp"
 #include "host/perception/segmentation_grid.hpp"
 
 namespace swarmfit::perception {
@@ -19,6 +21,7 @@ using Label = PottsEnergy::Label;
 constexpr Label kBackground = 0;
 constexpr double kDearest = 8;             // above any cost below
 constexpr int kFixed = -1, kOutside = -2;  // instead of a node's number
+constexpr int kNodesAtOnce = 1024;         // of a range that one thread works on
 
 /// exp(-x) for x in [0, 16), by steps.
 constexpr int kContrastSteps = 64;
@@ -33,8 +36,8 @@ const std::vector<double>& contrast_table() {
 
 /// The supporting plane as seen within one SOI: its own points, fitted anew, tell height from noise better than the whole plane does.
 struct LocalPlane {
-  Eigen::Vector3d normal;
-  double offset, sigma;
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  double offset = 0, sigma = 0;
   double height(const Eigen::Vector3d& x) const { return normal.dot(x) + offset; }
 };
 
@@ -45,7 +48,7 @@ class FusedCut {
     const double scale = grid_.width() / 640.0;
     band_ = tuning.band * scale;
     reach_ = tuning.reach * scale;
-    regions_ = soi_regions(input, grid_, options.soi_margin, static_cast<int>(std::ceil(reach_)));
+    regions_ = soi_regions(input, grid_, options.soi_margin, static_cast<int>(std::ceil(reach_)), options.fit.threads);
     if (options.smoothness > 0) tuning_.smoothness = options.smoothness;
     if (options.uncertain_cost > 0) tuning_.uncertain = options.uncertain_cost;
   }
@@ -53,64 +56,63 @@ class FusedCut {
   std::vector<std::uint16_t> run() {
     find_nodes();
     if (active_.empty()) return std::move(labels_);
-    for (const SoiRegion& region : regions_) {
-      planes_.push_back(region.label != 0 ? fit_plane(region) : std::nullopt);
-      if (region.label != 0) {
-        colours_.push_back(soi_colours(input_, grid_, region, options_.colour_neighbours, 4, tuning_.largest_sample));
-      } else {
-        colours_.emplace_back();
-      }
-    }
+    find_candidates();
     find_pairs();
     build_energy();
     energy_.close();
-    std::vector<Label> cut = energy_.cheapest();
     std::vector<Label> order;
     for (const SoiRegion& region : regions_)
       if (region.label != 0) order.push_back(region.label);
-    order.push_back(kBackground);
     order.push_back(kUncertain);
-    energy_.minimise(order, 3, cut);
+    order.push_back(kBackground);
+    std::vector<Label> cut(active_.size(), kBackground);
+    energy_.minimise(order, 1, cut, options_.fit.threads);  // more move next to nothing
     for (std::size_t n = 0; n < active_.size(); ++n) labels_[active_[n]] = cut[n];
     return std::move(labels_);
   }
 
  private:
+  /// What it costs a node to belong to one SOI's object, and what to belong to the background around it.
+  struct Candidate {
+    std::int32_t node;
+    Label label;
+    std::int32_t object, background;
+  };
   struct Pair {
-    std::size_t p, q;
+    std::int32_t p;    // node
+    std::size_t q;     // pixel
     float difference;  // of the colours, squared
-    float length;      // [px]
     bool jump;         // the depth breaks between them
   };
+  /// Pairs of consecutive nodes.
+  struct PairRange {
+    std::vector<Pair> pairs;
+    double difference = 0;  // sum
+  };
 
-  float distance(const SoiRegion& region, std::size_t i) const {
-    const cv::Point at(static_cast<int>(i % static_cast<std::size_t>(grid_.width())),
-                       static_cast<int>(i / static_cast<std::size_t>(grid_.width())));
-    return region.rect.contains(at) ? region.distance(at - region.rect.tl()) : 1e9f;
+  void for_regions(const std::function<void(std::size_t)>& body) const {
+    in_parallel(static_cast<int>(regions_.size()), 1, options_.fit.threads, [&](int first, int last) {
+      for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k)
+        if (regions_[k].label != 0) body(k);
+    });
   }
 
   /// Settles what the depth leaves no doubt about; the rest become nodes.
   void find_nodes() {
     labels_.assign(grid_.size(), kBackground);
     node_.assign(grid_.size(), kOutside);
+    std::vector<cv::Mat1b> doubtful(regions_.size());
+    for_regions([&](std::size_t k) { doubtful[k] = find_doubtful(regions_[k]); });
     for (const SoiRegion& region : regions_) {
       if (region.label == 0) continue;
-      // A pixel of the group is settled where all depth around is of the same group.
-      cv::Mat1b strange(region.rect.size()), near_strange;
+      const cv::Mat1b& in_doubt = doubtful[region.label - 1U];
       for (int y = 0; y < region.rect.height; ++y)
         for (int x = 0; x < region.rect.width; ++x) {
           const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
-          strange(y, x) = input_.popout[i] != region.label && grid_.finite(i) ? 255 : 0;
-        }
-      cv::dilate(strange, near_strange, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
-      for (int y = 0; y < region.rect.height; ++y)
-        for (int x = 0; x < region.rect.width; ++x) {
-          const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
-          const std::uint16_t own = input_.popout[i];
-          if (own == region.label) {
-            labels_[i] = own;
-            node_[i] = near_strange(y, x) == 0 ? kFixed : 0;
-          } else if (own == 0 && region.distance(y, x) <= (strange(y, x) != 0 ? band_ : reach_)) {
+          if (input_.popout[i] == region.label) {
+            labels_[i] = region.label;
+            node_[i] = in_doubt(y, x) != 0 ? 0 : kFixed;
+          } else if (in_doubt(y, x) != 0) {
             node_[i] = 0;
           }
         }
@@ -120,6 +122,24 @@ class FusedCut {
         node_[i] = static_cast<int>(active_.size());
         active_.push_back(i);
       }
+  }
+
+  /// Pixels of a group are settled where all depth around is of the same group; pixels of none where they are too far off.
+  cv::Mat1b find_doubtful(const SoiRegion& region) const {
+    cv::Mat1b strange(region.rect.size()), near_strange;
+    for (int y = 0; y < region.rect.height; ++y)
+      for (int x = 0; x < region.rect.width; ++x) {
+        const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
+        strange(y, x) = input_.popout[i] != region.label && grid_.finite(i) ? 255 : 0;
+      }
+    cv::dilate(strange, near_strange, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
+    for (int y = 0; y < region.rect.height; ++y)
+      for (int x = 0; x < region.rect.width; ++x) {
+        const std::uint16_t own = input_.popout[grid_.index(region.rect.x + x, region.rect.y + y)];
+        if (own == region.label) continue;
+        near_strange(y, x) = own == 0 && region.distance(y, x) <= (strange(y, x) != 0 ? band_ : reach_) ? 255 : 0;
+      }
+    return near_strange;
   }
 
   std::optional<LocalPlane> fit_plane(const SoiRegion& region) const {
@@ -164,96 +184,141 @@ class FusedCut {
     return fitted;
   }
 
-  void find_pairs() {
-    // Left as it comes from the system: only the pages around objects are ever touched.
-    const std::unique_ptr<Hls[]> hls(new Hls[grid_.size()]);
-    std::vector<bool> known(grid_.size());
-    const auto colour = [&](std::size_t i) -> const Hls& {
-      if (!known[i]) {
-        hls[i] = to_hls(grid_.rgb(i)[0], grid_.rgb(i)[1], grid_.rgb(i)[2]);
-        known[i] = true;
-      }
-      return hls[i];
-    };
-    pairs_.reserve(5 * active_.size());
-    constexpr std::array<std::array<int, 2>, 8> around = {{{1, 0}, {-1, 1}, {0, 1}, {1, 1}, {-1, 0}, {1, -1}, {0, -1}, {-1, -1}}};
-    for (const std::size_t p : active_) {
-      const int u = static_cast<int>(p % static_cast<std::size_t>(grid_.width())),
-                v = static_cast<int>(p / static_cast<std::size_t>(grid_.width()));
-      for (std::size_t d = 0; d < around.size(); ++d) {
-        const int x = u + around[d][0], y = v + around[d][1];
-        if (x < 0 || y < 0 || x >= grid_.width() || y >= grid_.height()) continue;
-        const std::size_t q = grid_.index(x, y);
-        if (d >= 4 && node_[q] >= 0) continue;  // seen from the other end
-        const float difference = colour_distance(colour(p), colour(q));
-        bool jump = false;
-        if (grid_.finite(p) && grid_.finite(q)) {
-          const double z = grid_.point(p).z();
-          jump = std::abs(z - grid_.point(q).z()) > std::max(options_.flood_step, 0.01 * z * z);
+  void find_candidates() {
+    std::vector<std::vector<Candidate>> found(regions_.size());
+    planes_.resize(regions_.size());
+    for_regions([&](std::size_t k) {
+      const SoiRegion& region = regions_[k];
+      planes_[k] = fit_plane(region);
+      SoiColours colours = soi_colours(input_, grid_, region, options_.colour_neighbours, 4, tuning_.largest_sample);
+      for (int y = 0; y < region.rect.height; ++y)
+        for (int x = 0; x < region.rect.width; ++x) {
+          const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
+          if (node_[i] >= 0 && region.distance(y, x) <= reach_) found[k].push_back(weigh(region, i, region.distance(y, x), colours));
         }
-        pairs_.push_back({p, q, difference * difference, d % 4 == 1 || d % 4 == 3 ? 1.41421356f : 1.0f, jump});
+    });
+    // From region by region to node by node.
+    first_candidate_.assign(active_.size() + 1, 0);
+    for (const auto& of_region : found)
+      for (const Candidate& c : of_region) ++first_candidate_[static_cast<std::size_t>(c.node) + 1];
+    std::partial_sum(first_candidate_.begin(), first_candidate_.end(), first_candidate_.begin());
+    candidates_.resize(first_candidate_.back());
+    std::vector<std::size_t> next(first_candidate_.begin(), first_candidate_.end() - 1);
+    for (const auto& of_region : found)
+      for (const Candidate& c : of_region) candidates_[next[static_cast<std::size_t>(c.node)]++] = c;
+  }
+
+  Candidate weigh(const SoiRegion& region, std::size_t i, double far, SoiColours& colours) const {
+    const std::uint8_t* rgb = grid_.rgb(i);
+    const double as_object = colours.object.cost(rgb[0], rgb[1], rgb[2]), as_background = colours.background.cost(rgb[0], rgb[1], rgb[2]);
+    // Shares of the sum tell more than the distances themselves.
+    const double sum = as_object + as_background + tuning_.colour_floor;
+    const double object_share = (as_object + tuning_.colour_floor / 2) / sum, background_share = 1 - object_share;
+    // A colour that neither sample knows makes both dear, so that the third label is cheapest.
+    const double alien = tuning_.alien * std::min(as_object, as_background);
+    double object = object_share + tuning_.spatial * far / reach_ + alien;
+    double background = background_share + alien;
+    if (grid_.finite(i)) {
+      const double risen = rise(region, i);  // 0 on the plane, 1 off it
+      object = tuning_.colour_with_depth * object + tuning_.depth * (1 - risen);
+      background = tuning_.colour_with_depth * background + tuning_.depth * risen;
+      if (input_.popout[i] != 0 && input_.popout[i] != region.label) object += tuning_.depth;
+    }
+    return {node_[i], region.label, static_cast<std::int32_t>(to_cost(object)), static_cast<std::int32_t>(to_cost(background))};
+  }
+
+  void find_pairs() {
+    const int count = static_cast<int>(active_.size());
+    std::vector<Hls> colours(active_.size());
+    pairs_.resize(static_cast<std::size_t>((count + kNodesAtOnce - 1) / kNodesAtOnce));
+    const auto colour = [&](std::size_t i) { return to_hls(grid_.rgb(i)[0], grid_.rgb(i)[1], grid_.rgb(i)[2]); };
+    in_parallel(count, kNodesAtOnce, options_.fit.threads, [&](int first, int last) {
+      for (int n = first; n < last; ++n) colours[static_cast<std::size_t>(n)] = colour(active_[static_cast<std::size_t>(n)]);
+    });
+    in_parallel(count, kNodesAtOnce, options_.fit.threads, [&](int first, int last) {
+      PairRange& range = pairs_[static_cast<std::size_t>(first / kNodesAtOnce)];
+      range.pairs.reserve(static_cast<std::size_t>(3 * (last - first)));
+      for (int n = first; n < last; ++n)
+        visit_neighbours(n, [&](std::size_t q) {
+          const float d = colour_distance(colours[static_cast<std::size_t>(n)],
+                                          node_[q] >= 0 ? colours[static_cast<std::size_t>(node_[q])] : colour(q));
+          range.pairs.push_back({n, q, d * d, jumps(active_[static_cast<std::size_t>(n)], q)});
+          range.difference += static_cast<double>(d * d);
+        });
+    });
+  }
+
+  /// visit(pixel) for the four around a node; of two nodes only the first has the second.
+  template <class Visit>
+  void visit_neighbours(int node, Visit&& visit) const {
+    constexpr std::array<std::array<int, 2>, 4> kAround = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
+    const std::size_t p = active_[static_cast<std::size_t>(node)], width = static_cast<std::size_t>(grid_.width());
+    const int u = static_cast<int>(p % width), v = static_cast<int>(p / width);
+    for (std::size_t d = 0; d < kAround.size(); ++d) {
+      const int x = u + kAround[d][0], y = v + kAround[d][1];
+      if (x < 0 || y < 0 || x >= grid_.width() || y >= grid_.height()) continue;
+      const std::size_t q = grid_.index(x, y);
+      if (d < 2 || node_[q] < 0) visit(q);  // else it is seen from the other end
+    }
+  }
+
+  bool jumps(std::size_t p, std::size_t q) const {
+    if (!grid_.finite(p) || !grid_.finite(q)) return false;
+    const double z = grid_.point(p).z();
+    return std::abs(z - grid_.point(q).z()) > std::max(options_.flood_step, 0.01 * z * z);
+  }
+
+  void build_energy() {
+    double sum = 0;
+    std::size_t count = 0;
+    for (const PairRange& range : pairs_) {
+      sum += range.difference;
+      count += range.pairs.size();
+    }
+    const double beta = count == 0 || sum <= 0 ? 0 : static_cast<double>(count) / (2 * sum);
+    energy_.reserve(active_.size(), candidates_.size() + 2 * active_.size(), count);
+    int n = 0;
+    for (const PairRange& range : pairs_) {
+      auto next = range.pairs.begin();
+      for (int k = 0; k < kNodesAtOnce && n < static_cast<int>(active_.size()); ++k, ++n) {
+        const auto first = next;
+        next = std::find_if(first, range.pairs.end(), [&](const Pair& pair) { return pair.p != n; });
+        add_node(n, {first, next}, beta);
       }
     }
   }
 
-  void build_energy() {
-    double mean = 0;
-    for (const Pair& pair : pairs_) mean += pair.difference;
-    const double beta = pairs_.empty() || mean <= 0 ? 0 : static_cast<double>(pairs_.size()) / (2 * mean);
-    const auto cost_of = [&](const Pair& pair) {
-      const double steps = beta * pair.difference * kContrastSteps;
-      const double contrast = steps < 16 * kContrastSteps ? contrast_table()[static_cast<std::size_t>(steps)] : 0;
-      return to_cost(tuning_.smoothness * (tuning_.flat + (1 - tuning_.flat) * contrast) * (pair.jump ? tuning_.at_jump : 1) / pair.length);
-    };
-    std::vector<std::pair<Label, PottsEnergy::Cost>> votes;
-    auto pair = pairs_.begin();
-    for (std::size_t n = 0; n < active_.size(); ++n) {
-      energy_.add_node();
-      // A settled neighbour speaks for its label in the node's own costs.
-      votes.clear();
-      for (; pair != pairs_.end() && pair->p == active_[n]; ++pair) {
-        if (node_[pair->q] >= 0) {
-          energy_.add_edge(static_cast<int>(n), node_[pair->q], cost_of(*pair));
-        } else {
-          votes.emplace_back(labels_[pair->q], cost_of(*pair));
-        }
-      }
-      const auto vote = [&](Label label) {
-        PottsEnergy::Cost against = 0;
-        for (const auto& [wanted, cost] : votes)
-          if (wanted != label) against += cost;
-        return against;
-      };
-      const std::size_t i = active_[n];
-      const std::uint8_t* rgb = grid_.rgb(i);
-      double background = kDearest;
-      const bool seen = grid_.finite(i);
-      for (const SoiRegion& region : regions_) {
-        if (region.label == 0) continue;
-        const double far = distance(region, i);
-        if (far > reach_) continue;
-        SoiColours& colours = colours_[region.label - 1U];
-        const double as_object = colours.object.cost(rgb[0], rgb[1], rgb[2]),
-                     as_background = colours.background.cost(rgb[0], rgb[1], rgb[2]);
-        // Shares of the sum tell more than the distances themselves.
-        const double sum = as_object + as_background + tuning_.colour_floor;
-        const double object_share = (as_object + tuning_.colour_floor / 2) / sum, background_share = 1 - object_share;
-        // A colour that neither sample knows makes both dear, so that the third label is cheapest.
-        const double alien = tuning_.alien * std::min(as_object, as_background);
-        double object = object_share + tuning_.spatial * far / reach_ + alien;
-        double here = background_share + alien;
-        if (seen) {
-          const double risen = rise(region, i);  // 0 on the plane, 1 off it
-          object = tuning_.colour_with_depth * object + tuning_.depth * (1 - risen);
-          here = tuning_.colour_with_depth * here + tuning_.depth * risen;
-          if (input_.popout[i] != 0 && input_.popout[i] != region.label) object += tuning_.depth;
-        }
-        background = std::min(background, here);
-        energy_.add_label(region.label, to_cost(object) + vote(region.label));
-      }
-      energy_.add_label(kBackground, to_cost(background) + vote(kBackground));
-      if (!seen) energy_.add_label(kUncertain, to_cost(tuning_.uncertain) + vote(kUncertain));
+  void add_node(int n, std::span<const Pair> pairs, double beta) {
+    energy_.add_node();
+    // A settled neighbour speaks for its label in the node's own costs.
+    votes_.clear();
+    for (const Pair& pair : pairs) {
+      const PottsEnergy::Cost cost = boundary_cost(pair, beta);
+      if (node_[pair.q] >= 0)
+        energy_.add_edge(n, node_[pair.q], cost);
+      else
+        votes_.emplace_back(labels_[pair.q], cost);
     }
+    const auto vote = [&](Label label) {
+      PottsEnergy::Cost against = 0;
+      for (const auto& [wanted, cost] : votes_)
+        if (wanted != label) against += cost;
+      return against;
+    };
+    auto background = static_cast<std::int32_t>(to_cost(kDearest));
+    for (std::size_t c = first_candidate_[static_cast<std::size_t>(n)]; c < first_candidate_[static_cast<std::size_t>(n) + 1]; ++c) {
+      background = std::min(background, candidates_[c].background);
+      energy_.add_label(candidates_[c].label, candidates_[c].object + vote(candidates_[c].label));
+    }
+    energy_.add_label(kBackground, background + vote(kBackground));
+    if (!grid_.finite(active_[static_cast<std::size_t>(n)])) energy_.add_label(kUncertain, to_cost(tuning_.uncertain) + vote(kUncertain));
+  }
+
+  PottsEnergy::Cost boundary_cost(const Pair& pair, double beta) const {
+    const double steps = beta * static_cast<double>(pair.difference) * kContrastSteps;
+    const double contrast = steps < 16 * kContrastSteps ? contrast_table()[static_cast<std::size_t>(steps)] : 0;
+    const double share = tuning_.flat + (1 - tuning_.flat) * contrast;
+    return to_cost(tuning_.smoothness * share * (pair.jump ? tuning_.at_jump : 1));
   }
 
   /// How surely a seen pixel lies off the SOI's plane, in [0, 1].
@@ -296,8 +361,10 @@ class FusedCut {
   std::vector<int> node_;            // one a pixel: its node, kFixed or kOutside
   std::vector<std::size_t> active_;  // one a node: its pixel
   std::vector<std::optional<LocalPlane>> planes_;
-  std::vector<SoiColours> colours_;
-  std::vector<Pair> pairs_;
+  std::vector<Candidate> candidates_;         // node by node
+  std::vector<std::size_t> first_candidate_;  // of each node
+  std::vector<PairRange> pairs_;
+  std::vector<std::pair<Label, PottsEnergy::Cost>> votes_;
   PottsEnergy energy_;
 };
 

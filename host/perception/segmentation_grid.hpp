@@ -33,10 +33,11 @@ class PixelGrid {
     return {frame_.values64[3 * i], frame_.values64[3 * i + 1], frame_.values64[3 * i + 2]};
   }
   bool finite(std::size_t i) const {
-    return frame_.values64.empty() ? std::isfinite(frame_.values32[3 * i]) && std::isfinite(frame_.values32[3 * i + 1]) &&
-                                         std::isfinite(frame_.values32[3 * i + 2])
-                                   : std::isfinite(frame_.values64[3 * i]) && std::isfinite(frame_.values64[3 * i + 1]) &&
-                                         std::isfinite(frame_.values64[3 * i + 2]);
+    // The sum of floats does not overflow in double precision; that of doubles means the same for all a sensor can tell.
+    return frame_.values64.empty()
+               ? std::isfinite(static_cast<double>(frame_.values32[3 * i]) + static_cast<double>(frame_.values32[3 * i + 1]) +
+                               static_cast<double>(frame_.values32[3 * i + 2]))
+               : std::isfinite(frame_.values64[3 * i] + frame_.values64[3 * i + 1] + frame_.values64[3 * i + 2]);
   }
   const std::uint8_t* rgb(std::size_t i) const { return &frame_.rgb[3 * i]; }
 
@@ -52,7 +53,7 @@ struct SoiRegion {
 };
 
 /// One region a SOI, in their order.
-std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGrid& grid, double margin, int least_border);
+std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGrid& grid, double margin, int least_border, int threads);
 
 /// Colour samples of a space of interest: `object` from its back-projected points, `background` from the others within its sphere.
 struct SoiColours {
@@ -67,7 +68,7 @@ std::vector<std::uint16_t> segment_paper(const SegmentationInput& input, const P
 struct FusedTuning {
   double band = 6;                 ///< seen pixels farther from every group are background [px at 640 columns]
   double reach = 20;               ///< so are unseen ones farther than this
-  double smoothness = 0.8;         ///< of a boundary between two alike pixels side by side
+  double smoothness = 1.2;         ///< of a boundary between two alike pixels side by side
   double flat = 0.1;               ///< share of that which contrast cannot take away
   double at_jump = 0.2;            ///< share that is left where the depth breaks
   double uncertain = 0.6;          ///< cost of the third label, for unseen pixels

@@ -26,6 +26,14 @@ constexpr float kNoiseAtOneMetre = 0.0015f;  // [m] where there are too few inli
 
 using Points2 = std::vector<Eigen::Vector2f>;
 
+/// The first and the last of each row of cells; the hull of all is that of these.
+Points2 row_ends(const Points2& cells) {
+  Points2 ends;
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    if (i == 0 || i + 1 == cells.size() || cells[i - 1].y() != cells[i].y() || cells[i + 1].y() != cells[i].y()) ends.push_back(cells[i]);
+  return ends;
+}
+
 /// Andrew's monotone chain, counter-clockwise.
 Points2 convex_hull(Points2 points) {
   const auto less = [](const Eigen::Vector2f& a, const Eigen::Vector2f& b) { return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y()); };
@@ -75,28 +83,72 @@ double principal_length(const Points2& points) {
   return high - low;
 }
 
+/// Of a bitmap row after row: 1 where a cell in the square of `before` cells to the left and above and `after` to the right and below is set.
+std::vector<std::uint8_t> widen(const std::vector<std::uint8_t>& set, int columns, int rows, int before, int after) {
+  const auto sweep = [&](const std::vector<std::uint8_t>& from, int lines, std::size_t line, int length, std::size_t step) {
+    std::vector<std::uint8_t> to(from.size(), 0);
+    for (int l = 0; l < lines; ++l) {
+      const std::size_t start = static_cast<std::size_t>(l) * line;
+      int last = -1;  // of the cells marked so far
+      for (int k = 0; k < length; ++k) {
+        if (from[start + static_cast<std::size_t>(k) * step] == 0) continue;
+        for (int m = std::max(last + 1, k - after); m <= std::min(length - 1, k + before); ++m)
+          to[start + static_cast<std::size_t>(m) * step] = 1;
+        last = std::min(length - 1, k + before);
+      }
+    }
+    return to;
+  };
+  const auto width = static_cast<std::size_t>(columns);
+  return sweep(sweep(set, rows, width, columns, 1), columns, 1, rows, width);
+}
+
 /// Cells within `margin` of the convex polygon become 1, those well inside it 2.
 void fill_hull(const Points2& hull, float margin, Surface& surface) {
-  const auto depth_inside = [&](const Eigen::Vector2f& p) {
-    float depth = std::numeric_limits<float>::max();
-    for (std::size_t i = 0; i < hull.size() && depth >= -margin; ++i) {
-      const Eigen::Vector2f edge = hull[(i + 1) % hull.size()] - hull[i], to = p - hull[i];
-      depth = std::min(depth, (edge.x() * to.y() - edge.y() * to.x()) / edge.norm());
+  struct Span {
+    float low = std::numeric_limits<float>::lowest(), high = std::numeric_limits<float>::max();
+    /// Keeps the x with slope * x + offset >= 0.
+    void clip(float slope, float offset) {
+      if (slope > 0)
+        low = std::max(low, -offset / slope);
+      else if (slope < 0)
+        high = std::min(high, -offset / slope);
+      else if (offset < 0)
+        high = std::numeric_limits<float>::lowest();
     }
-    return depth;
   };
-  for (int b = 0; b < surface.rows; ++b)
-    for (int a = 0; a < surface.columns; ++a) {
-      const Eigen::Vector2f centre =
-          surface.low + surface.cell * Eigen::Vector2f(static_cast<float>(a) + 0.5f, static_cast<float>(b) + 0.5f);
-      auto& cell = surface.extent[static_cast<std::size_t>(b * surface.columns + a)];
-      const float depth = depth_inside(centre);
-      if (depth >= -margin) cell = std::max<std::uint8_t>(cell, depth >= kEdge ? 2 : 1);
+  const auto mark = [&](int row, const Span& span, std::uint8_t value) {
+    const auto column = [&](float x) {
+      return std::clamp((x - surface.low.x()) / surface.cell - 0.5f, -1.0f, static_cast<float>(surface.columns));
+    };
+    const int first = std::max(0, static_cast<int>(std::ceil(column(span.low)))),
+              last = std::min(surface.columns - 1, static_cast<int>(std::floor(column(span.high))));
+    for (int a = first; a <= last; ++a) {
+      auto& cell = surface.extent[static_cast<std::size_t>(row * surface.columns + a)];
+      cell = std::max(cell, value);
     }
+  };
+  for (int b = 0; b < surface.rows; ++b) {
+    const float y = surface.low.y() + surface.cell * (static_cast<float>(b) + 0.5f);
+    Span within, well_inside;
+    for (std::size_t i = 0; i < hull.size(); ++i) {
+      // Depth of (x, y) behind this edge: linear in x.
+      const Eigen::Vector2f edge = (hull[(i + 1) % hull.size()] - hull[i]).normalized();
+      const float offset = edge.x() * (y - hull[i].y()) + edge.y() * hull[i].x();
+      within.clip(-edge.y(), offset + margin);
+      well_inside.clip(-edge.y(), offset - kEdge);
+    }
+    mark(b, within, 1);
+    mark(b, well_inside, 2);
+  }
 }
 
 /// Groups of occupied cells with gaps of at most `reach` cells; 0 where nothing is, k the k-th group.
 std::vector<int> group_cells(const std::vector<int>& hits, int columns, int rows, int reach, int* groups) {
+  std::vector<std::uint8_t> occupied(hits.size());
+  for (std::size_t at = 0; at < hits.size(); ++at) occupied[at] = hits[at] != 0;
+  // Two cells are within reach of each other where their squares of reach x reach cells touch or overlap.
+  const auto wide = widen(occupied, columns, rows, reach - 1, 0);
   std::vector<int> group(hits.size(), 0), stack;
   *groups = 0;
   for (std::size_t seed = 0; seed < hits.size(); ++seed) {
@@ -106,15 +158,17 @@ std::vector<int> group_cells(const std::vector<int>& hits, int columns, int rows
     while (!stack.empty()) {
       const int at = stack.back(), a0 = at % columns, b0 = at / columns;
       stack.pop_back();
-      for (int b = std::max(0, b0 - reach); b <= std::min(rows - 1, b0 + reach); ++b)
-        for (int a = std::max(0, a0 - reach); a <= std::min(columns - 1, a0 + reach); ++a) {
+      for (int b = std::max(0, b0 - 1); b <= std::min(rows - 1, b0 + 1); ++b)
+        for (int a = std::max(0, a0 - 1); a <= std::min(columns - 1, a0 + 1); ++a) {
           const auto to = static_cast<std::size_t>(b * columns + a);
-          if (hits[to] == 0 || group[to] != 0) continue;
+          if (wide[to] == 0 || group[to] != 0) continue;
           group[to] = *groups;
           stack.push_back(static_cast<int>(to));
         }
     }
   }
+  for (std::size_t at = 0; at < hits.size(); ++at)
+    if (hits[at] == 0) group[at] = 0;
   return group;
 }
 
@@ -201,25 +255,20 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
   for (std::size_t g = 0; g < cells.size(); ++g) {
     kept[g] = static_cast<double>(cells[g].size()) >= kSplinter * static_cast<double>(largest);
     if (!kept[g]) continue;
-    const auto hull = convex_hull(cells[g]);
+    const auto hull = convex_hull(row_ends(cells[g]));
     if (hull.size() >= 3) fill_hull(hull, static_cast<float>(margin), surface);
     surface.area += cell_area * static_cast<double>(cells[g].size());
   }
   const auto piece = largest_piece(hits, surface);
-  surface.piece_area = polygon_area(convex_hull(piece));
+  surface.piece_area = polygon_area(convex_hull(row_ends(piece)));
   surface.piece_length = principal_length(piece);
   for (std::size_t at = 0; at < group.size(); ++at) surface.component[at] = group[at] != 0 && kept[static_cast<std::size_t>(group[at] - 1)];
   return surface;
 }
 
-bool Surface::near_component(const Eigen::Vector3f& p, float reach) const noexcept {
+std::vector<std::uint8_t> Surface::near_component(float reach) const {
   const int steps = static_cast<int>(reach / cell);
-  const int a0 = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell)),
-            b0 = static_cast<int>(std::floor((axis_b.dot(p) - low.y()) / cell));
-  for (int b = std::max(0, b0 - steps); b <= std::min(rows - 1, b0 + steps); ++b)
-    for (int a = std::max(0, a0 - steps); a <= std::min(columns - 1, a0 + steps); ++a)
-      if (component[static_cast<std::size_t>(b * columns + a)] != 0) return true;
-  return false;
+  return widen(component, columns, rows, steps, steps);
 }
 
 double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> labels, const Surface& surface) {

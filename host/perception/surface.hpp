@@ -24,10 +24,11 @@ struct Surface {
   double piece_length = 0;              ///< of that piece, along its principal axis [m]
   double noise = 0;                     ///< standard deviation of the inliers' heights at a range of one metre; grows with its square
 
+  /// Its place in the bitmap, or -1 outside.
   int cell_of(const Eigen::Vector3f& p) const noexcept {
-    const int a = static_cast<int>(std::floor((axis_a.dot(p) - low.x()) / cell));
-    const int b = static_cast<int>(std::floor((axis_b.dot(p) - low.y()) / cell));
-    return a < 0 || b < 0 || a >= columns || b >= rows ? -1 : b * columns + a;
+    const float a = (axis_a.dot(p) - low.x()) / cell, b = (axis_b.dot(p) - low.y()) / cell;
+    if (!(a >= 0 && b >= 0 && a < static_cast<float>(columns) && b < static_cast<float>(rows))) return -1;
+    return static_cast<int>(b) * columns + static_cast<int>(a);
   }
   bool contains(const Eigen::Vector3f& p) const noexcept {
     const int at = cell_of(p);
@@ -37,8 +38,8 @@ struct Surface {
     const int at = cell_of(p);
     return at >= 0 && component[static_cast<std::size_t>(at)] != 0;
   }
-  /// Whether a kept surface has a cell within `reach` [m].
-  bool near_component(const Eigen::Vector3f& p, float reach) const noexcept;
+  /// 1 on cells that have a kept surface's cell within `reach` [m] along both axes.
+  std::vector<std::uint8_t> near_component(float reach) const;
   bool at_edge(const Eigen::Vector3f& p) const noexcept {
     const int at = cell_of(p);
     return at < 0 || extent[static_cast<std::size_t>(at)] < 2;

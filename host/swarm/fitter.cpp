@@ -87,6 +87,19 @@ Expected<Fitter> Fitter::create(const FitOptions& options) {
 
 const FitOptions& Fitter::options() const noexcept { return state_->options; }
 
+Expected<> Fitter::set_options(const FitOptions& options) {
+  if (auto ok = options.validate(); !ok) return ok;
+  const FitOptions& old = state_->options;
+  if (options.backend != old.backend)
+    return fail(Error::Kind::invalid_option, fmt::format("backend is {}, must stay {}", options.backend, old.backend));
+  if (options.threads != old.threads)
+    return fail(Error::Kind::invalid_option, fmt::format("threads is {}, must stay {}", options.threads, old.threads));
+  if (options.pipeline_cache != old.pipeline_cache)
+    return fail(Error::Kind::invalid_option, fmt::format("pipeline_cache is {}, must stay {}", options.pipeline_cache, old.pipeline_cache));
+  state_->options = options;
+  return {};
+}
+
 BackendInfo Fitter::backend() const {
   const kernels::Identity& who = state_->evaluator->identity();
   return {who.backend, who.device, state_->reason};

@@ -94,6 +94,8 @@ class SWARMFIT_API Fitter {
                           const std::vector<Model>& warm_start = {});
 
   const FitOptions& options() const noexcept;
+  /// Options of the fits to come, on the same back end. Fails with invalid_option, also where backend, threads or pipeline_cache differ.
+  Expected<> set_options(const FitOptions& options);
   BackendInfo backend() const;
 
  private:

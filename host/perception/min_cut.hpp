@@ -1,0 +1,58 @@
+// Minimum cuts of a graph between a source and a sink, after Boykov and Kolmogorov 2004.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace swarmfit::perception {
+
+/// One graph, of which each cut takes a part. Arcs lie node by node, and each has its mate in the other direction. Parts without a node or
+/// an arc in common may be cut at the same time by different threads.
+class CutGraph {
+ public:
+  struct Arc {
+    std::int32_t head, mate;  ///< node at its other end, and the arc back
+  };
+
+  CutGraph() = default;
+  /// Arcs of node i are [first[i], first[i + 1]).
+  CutGraph(std::vector<std::int32_t> first, std::vector<Arc> arcs);
+
+  std::int32_t first_arc(std::int32_t node) const noexcept { return first_[static_cast<std::size_t>(node)]; }
+  std::int32_t last_arc(std::int32_t node) const noexcept { return first_[static_cast<std::size_t>(node) + 1]; }
+  const Arc& arc(std::int32_t a) const noexcept { return arcs_[static_cast<std::size_t>(a)]; }
+
+  /// To be set before each cut, for all its nodes and all arcs at them: an arc that leaves the part has capacity 0, and so has its mate.
+  /// Below 2^30.
+  std::int32_t& capacity(std::int32_t a) noexcept { return capacity_[static_cast<std::size_t>(a)]; }
+  /// From the source where > 0, to the sink where < 0.
+  std::int32_t& terminal(std::int32_t node) noexcept { return nodes_[static_cast<std::size_t>(node)].terminal; }
+
+  /// Finds a minimum cut between the nodes of `part`, the one with the fewest nodes on the sink's side.
+  void cut(std::span<const std::int32_t> part);
+  bool at_sink(std::int32_t node) const noexcept {
+    const Node& n = nodes_[static_cast<std::size_t>(node)];
+    return n.parent != kFree && n.sink;
+  }
+
+ private:
+  friend class CutSearch;
+  static constexpr std::int32_t kFree = -1, kTerminal = -2, kOrphan = -3;  // instead of a parent's arc
+  struct Node {
+    std::int32_t terminal = 0;
+    std::int32_t parent = kFree;  // the arc towards it
+    std::int32_t next = -1;       // in the list of active nodes; itself where it is the last
+    std::int32_t stamp = 0;       // when `distance` was true
+    std::int32_t distance = 0;    // to the terminal, in arcs
+    bool sink = false;            // whose tree it belongs to
+  };
+
+  std::vector<std::int32_t> first_;
+  std::vector<Arc> arcs_;
+  std::vector<std::int32_t> capacity_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace swarmfit::perception
