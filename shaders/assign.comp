@@ -18,7 +18,7 @@ void main() {
   for (uint m = 0; m < push.models; ++m) {
     float k[kCoefficientStride];
     load_model(m, k);
-    const uint kind = uint(k[kKindSlot]);
+    const uint kind = kModel == kAnyModel ? uint(k[kKindSlot]) : kModel;
     const uint number = uint(k[kNumberSlot]);
     const vec4 distance = abs(residuals(kind, x, k));
     [[unroll]] for (uint j = 0; j < kQuad; ++j) {

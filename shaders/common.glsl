@@ -8,5 +8,10 @@ layout(constant_id = kSpecDimension) const uint kDimension = 3;
 
 layout(push_constant) uniform PushBlock { Push push; };
 
+const uint kInfinityBits = 0x7F800000u;
+
+// a / b for a >= 0, infinite where b is not above 0.
+vec4 ratio(vec4 a, vec4 b) { return mix(vec4(uintBitsToFloat(kInfinityBits)), a / b, greaterThan(b, vec4(0.0))); }
+
 #include "fetch.glsl"
 #include "models.glsl"

@@ -27,20 +27,21 @@ SWARMFIT_CONST kBindingCount = 9;
 
 // Specialisation constants.
 SWARMFIT_CONST kSpecGroup = 0;      // invocations in a group: the subgroup's size or a multiple of it
-SWARMFIT_CONST kSpecModel = 1;      // a ModelKind
+SWARMFIT_CONST kSpecModel = 1;      // a ModelKind; assign: kAnyModel where there are several
 SWARMFIT_CONST kSpecLoss = 2;       // a Loss
 SWARMFIT_CONST kSpecDimension = 3;  // columns of a point
 SWARMFIT_CONST kSpecTile = 4;       // particles held by an invocation
 SWARMFIT_CONST kSpecWork = 5;       // quads (four points) an invocation goes through
 SWARMFIT_CONST kSpecCount = 6;
 
+SWARMFIT_CONST kAnyModel = 0xFFFFFFFFu;
 SWARMFIT_CONST kLossL1 = 0;
 SWARMFIT_CONST kLossL2 = 1;
 
 SWARMFIT_CONST kMaxColumns = 4;
-SWARMFIT_CONST kCoefficientStride = 16;  // floats from one model to the next: kMaxParameters coefficients, then
-SWARMFIT_CONST kKindSlot = 14;           // assign: its ModelKind
-SWARMFIT_CONST kNumberSlot = 15;         // assign: its label
+SWARMFIT_CONST kCoefficientStride = 20;  // floats from one model to the next: kMaxCoefficients coefficients, then
+SWARMFIT_CONST kKindSlot = 18;           // assign: its ModelKind
+SWARMFIT_CONST kNumberSlot = 19;         // assign: its label
 SWARMFIT_CONST kQuad = 4;
 
 struct Push {

@@ -18,8 +18,8 @@ std::map<std::string, Result<std::unique_ptr<FitnessEvaluator>>>& evaluators() {
   return all;
 }
 
-std::map<std::string, double>& errors() {
-  static std::map<std::string, double> all;
+std::map<std::pair<std::string, ModelKind>, double>& errors() {
+  static std::map<std::pair<std::string, ModelKind>, double> all;
   return all;
 }
 
@@ -27,20 +27,6 @@ Result<std::unique_ptr<FitnessEvaluator>> make(const Contender& contender) {
   if (contender.backend == "vulkan") return make_vulkan_evaluator(contender.options, "");
   if (contender.backend == "cpu") return make_cpu_evaluator(contender.options);
   return make_reference_evaluator();
-}
-
-/// The model that most points of make_cloud follow.
-void true_model(ModelKind kind, double middle, double* p) {
-  if (kind == ModelKind::line2d) {
-    p[0] = 0.6;
-    p[1] = 0.8;
-    p[2] = -(0.6 + 0.8) * middle;
-  } else {
-    p[0] = 2.0 / 7;
-    p[1] = 3.0 / 7;
-    p[2] = 6.0 / 7;
-    p[3] = -(p[0] + p[1] + p[2]) * middle;
-  }
 }
 
 }  // namespace
@@ -89,90 +75,18 @@ std::set<std::string>& skipped() {
   return all;
 }
 
-void note_error(const std::string& contender, double relative) { errors()[contender] = std::max(errors()[contender], relative); }
+void note_error(const std::string& contender, ModelKind kind, double relative) {
+  double& largest = errors()[{contender, kind}];
+  largest = std::max(largest, relative);
+}
 
 void print_summary() {
-  for (const auto& [contender, error] : errors()) {
-    std::printf("largest relative error of a cost: %-16s %.2e (tolerance %.0e)\n", contender.c_str(), error, kCostTolerance);
+  for (const auto& [what, error] : errors()) {
+    const std::string kind(traits(what.second).name);
+    std::printf("largest relative error of a cost: %-16s %-11s %.2e (tolerance %.0e)\n", what.first.c_str(), kind.c_str(), error,
+                kCostTolerance);
   }
   for (const std::string& what : skipped()) std::printf("SKIPPED: %s\n", what.c_str());
-}
-
-PointsView Cloud::view() const {
-  const auto columns = static_cast<std::size_t>(dimension);
-  if (!narrow.empty()) return {narrow.data(), Scalar::float32, dimension, count(), columns * sizeof(float)};
-  return {wide.data(), Scalar::float64, dimension, count(), columns * sizeof(double)};
-}
-
-double Cloud::worst_loss(Loss loss) const {
-  double sum = 0;
-  for (std::size_t i = 0; i < count(); ++i) {
-    const double cap = caps[i];
-    if (view().finite(i)) sum += loss == Loss::truncated_l1 ? cap : cap * cap;
-  }
-  return sum;
-}
-
-double Cloud::radius() const {
-  const Extent extent = measure(view());
-  double radius = 0;
-  for (std::size_t i = 0; i < count(); ++i) {
-    for (int d = 0; extent.finite[i] && d < dimension; ++d) radius = std::max(radius, std::abs(view().at(i, d) - extent.centre[d]));
-  }
-  return radius;
-}
-
-double Random::operator()() {  // splitmix64
-  std::uint64_t z = state_ += 0x9E3779B97F4A7C15ULL;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBULL;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
-}
-
-Cloud make_cloud(ModelKind kind, std::size_t count, double middle, double size, bool float32) {
-  Random random(count + 17);
-  double model[kMaxParameters] = {};
-  true_model(kind, middle, model);
-  Cloud cloud;
-  cloud.dimension = traits(kind).dimension;
-  for (std::size_t i = 0; i < count; ++i) {
-    double x[kMaxDimension];
-    double distance = model[traits(kind).parameter_count - 1];
-    for (int d = 0; d < cloud.dimension; ++d) {
-      x[d] = middle + random.between(-size, size);
-      distance += model[d] * x[d];
-    }
-    const bool inlier = random() < 0.6;
-    const double off = random.between(-0.004, 0.004) * size;
-    for (int d = 0; d < cloud.dimension; ++d) {
-      if (inlier) x[d] -= model[d] * (distance - off);
-      if (float32) {
-        cloud.narrow.push_back(static_cast<float>(x[d]));
-      } else {
-        cloud.wide.push_back(x[d]);
-      }
-    }
-    cloud.caps.push_back(static_cast<float>(random.between(0.005, 0.02) * size));
-  }
-  return cloud;
-}
-
-std::vector<double> make_swarm(ModelKind kind, std::size_t count, double middle, double size) {
-  Random random(count + 99);
-  const int width = traits(kind).parameter_count;
-  std::vector<double> swarm;
-  for (std::size_t j = 0; j < count; ++j) {
-    double p[kMaxParameters] = {};
-    true_model(kind, middle, p);
-    const double spread = j % 2 == 0 ? 0.01 : 2.0;
-    double norm = 0;
-    double at_middle = 0;
-    for (int d = 0; d + 1 < width; ++d) norm += std::pow(p[d] += random.between(-spread, spread), 2);
-    for (int d = 0; d + 1 < width; ++d) at_middle += (p[d] /= std::sqrt(norm)) * middle;
-    p[width - 1] = -at_middle + random.between(-spread, spread) * size / 2;
-    swarm.insert(swarm.end(), p, p + width);
-  }
-  return swarm;
 }
 
 void Conformance::SetUp() {
@@ -225,7 +139,7 @@ std::vector<float> Conformance::expect_costs_agree(const Cloud& cloud, ModelKind
     }
     const double error = std::abs(static_cast<double>(found[j]) - static_cast<double>(oracle)) / worst_loss;
     EXPECT_LE(error, kCostTolerance) << "model " << j << " of " << count << ": " << found[j] << ", the reference says " << oracle;
-    note_error(GetParam().name, error);
+    note_error(GetParam().name, kind, error);
   }
   return found;
 }

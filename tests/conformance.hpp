@@ -38,8 +38,8 @@ std::vector<std::string>& validation_messages();
 /// Back ends whose absence is a failure (--require-backend), and what was skipped.
 std::set<std::string>& required_backends();
 std::set<std::string>& skipped();
-/// Largest |cost - reference| / cost of a model that explains nothing, by contender.
-void note_error(const std::string& contender, double relative);
+/// Largest |cost - reference| / cost of a model that explains nothing, by contender and kind.
+void note_error(const std::string& contender, ModelKind kind, double relative);
 void print_summary();
 
 /// A cloud with its caps, packed rows of doubles or floats.

@@ -58,10 +58,11 @@ TEST_P(VulkanDevices, SmallStorageRangesSplitTheCloud) {
     const auto small = make(options);
     ASSERT_TRUE(small);
     for (const ModelKind kind : kModelKinds) {
+      if (!traits(kind).affine && range > 16384) continue;  // the smallest splits most
       Cloud cloud = make_cloud(kind, 60001);
       cloud.narrow[7] = std::numeric_limits<float>::quiet_NaN();
       load(cloud);
-      const std::vector<double> swarm = make_swarm(kind, 300);
+      const std::vector<double> swarm = make_swarm(kind, traits(kind).affine ? 300 : 50);
       const std::vector<float> whole = costs(kind, swarm, Loss::truncated_l1);
       const std::vector<float> split = costs_of(*small, cloud, kind, swarm);
       double worst = 0;

@@ -99,7 +99,7 @@ class CpuEvaluator final : public FitnessEvaluator {
   Result<> distances(const ModelView& model, std::span<float> distances) override {
     if (auto ok = check_model(model, store_.dimension()); !ok) return ok;
     if (auto ok = check_size("distances.size()", distances.size(), store_.count()); !ok) return ok;
-    std::array<float, kMaxParameters> k{};
+    std::array<float, kMaxCoefficients> k{};
     const bool finite = centre(model, k.data());
     std::fill(distances.begin(), distances.end(), std::numeric_limits<float>::quiet_NaN());
     arena_.execute([&] {
@@ -121,7 +121,7 @@ class CpuEvaluator final : public FitnessEvaluator {
   Result<> assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) override {
     if (auto ok = check_assign(models, store_.dimension(), store_.count(), tolerance, labels); !ok) return ok;
     return guarded(store_.count(), [&] {
-      std::vector<std::array<float, kMaxParameters>> coefficients(models.size());
+      std::vector<std::array<float, kMaxCoefficients>> coefficients(models.size());
       std::vector<char> usable(models.size());
       for (std::size_t m = 0; m < models.size(); ++m) usable[m] = centre(models[m], coefficients[m].data());
       std::fill(labels.begin(), labels.end(), std::uint16_t{0});
@@ -137,7 +137,7 @@ class CpuEvaluator final : public FitnessEvaluator {
  private:
   /// Coefficients in the frame of the stored points; false if one is not finite.
   bool centre(const ModelView& model, float* k) const {
-    std::array<double, kMaxParameters> wide{};
+    std::array<double, kMaxCoefficients> wide{};
     const bool finite = centred_coefficients(model.kind, model.parameters.data(), store_.centre(), wide.data());
     // What float cannot hold is farther away than any point either way.
     constexpr double most = 1e30;
@@ -151,14 +151,15 @@ class CpuEvaluator final : public FitnessEvaluator {
     coefficients_.resize(swarm.count * width);
     finite_.resize(swarm.count);
     for (std::size_t j = 0; j < swarm.count; ++j) {
-      std::array<float, kMaxParameters> k{};
+      std::array<float, kMaxCoefficients> k{};
       finite_[j] = centre(ModelView{swarm.kind, swarm.parameters.subspan(j * rows, rows)}, k.data());
       for (std::size_t c = 0; c < width; ++c) coefficients_[j * width + c] = finite_[j] ? k[c] : 0.0F;
     }
   }
 
-  void assign_tile(std::size_t tile, std::span<const ModelView> models, const std::vector<std::array<float, kMaxParameters>>& coefficients,
-                   const std::vector<char>& usable, std::span<const float> tolerance, std::span<std::uint16_t> labels) const {
+  void assign_tile(std::size_t tile, std::span<const ModelView> models,
+                   const std::vector<std::array<float, kMaxCoefficients>>& coefficients, const std::vector<char>& usable,
+                   std::span<const float> tolerance, std::span<std::uint16_t> labels) const {
     alignas(64) std::array<float, kTilePoints> near, nearest, allowed;
     std::array<std::uint16_t, kTilePoints> label;
     const std::size_t first = tile * kTilePoints;

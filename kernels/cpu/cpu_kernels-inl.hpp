@@ -6,6 +6,9 @@
 #define SWARMFIT_CPU_KERNELS_INL
 #endif
 
+#include <algorithm>
+#include <cmath>
+
 #include <hwy/highway.h>
 
 #include "kernels/cpu/cpu_kernels.hpp"
@@ -27,8 +30,17 @@ constexpr std::size_t lanes() { return HWY_LANES(float); }
 
 /// What models.inl computes with.
 struct VectorMath {
+  static HWY_INLINE Vector add(Vector a, Vector b) { return hn::Add(a, b); }
+  static HWY_INLINE Vector sub(Vector a, Vector b) { return hn::Sub(a, b); }
+  static HWY_INLINE Vector mul(Vector a, Vector b) { return hn::Mul(a, b); }
+  static HWY_INLINE Vector div(Vector a, Vector b) { return hn::Div(a, b); }
+  static HWY_INLINE Vector sqrt(Vector a) { return hn::Sqrt(a); }
   static HWY_INLINE Vector mul_add(Vector a, Vector b, Vector c) { return hn::MulAdd(a, b, c); }
-  static HWY_INLINE Vector set(double value) { return hn::Set(FloatTag(), static_cast<float>(value)); }
+  static HWY_INLINE Vector neg_mul_add(Vector a, Vector b, Vector c) { return hn::NegMulAdd(a, b, c); }
+  static HWY_INLINE Vector ratio(Vector a, Vector b) {
+    const FloatTag d;
+    return hn::IfThenElse(hn::Gt(b, hn::Zero(d)), hn::Div(a, b), hn::Inf(d));
+  }
 };
 
 /// The lesser of a magnitude and a limit >= 0, or the limit where the magnitude is NaN.
@@ -206,7 +218,7 @@ HWY_INLINE void distances_of(const TileView& tile, const float* HWY_RESTRICT coe
   for (std::size_t i = 0; i < tile.blocks * kBlockPoints; i += lanes()) {
     Vector x[Model::traits.dimension];
     for (int column = 0; column < Model::traits.dimension; ++column) x[column] = hn::Load(d, tile.columns[column] + i);
-    hn::StoreU(hn::Abs(Model::residual(VectorMath(), x, k)), d, out + i);
+    hn::StoreU(least(hn::Abs(Model::residual(VectorMath(), x, k)), hn::Inf(d)), d, out + i);
   }
 }
 

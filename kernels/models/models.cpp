@@ -1,5 +1,6 @@
 #include "kernels/models/models.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #define SWARMFIT_INLINE inline
@@ -22,11 +23,10 @@ std::optional<ModelKind> model_kind(std::string_view name) noexcept {
 
 bool centred_coefficients(ModelKind kind, const double* parameters, const double* centre, double* coefficients) noexcept {
   return visit_model(kind, [&]<class M>() {
+    const auto finite = [](double value) { return std::isfinite(value); };
     M::centre(parameters, centre, coefficients);
-    for (int i = 0; i < M::traits.coefficient_count; ++i) {
-      if (!std::isfinite(coefficients[i])) return false;
-    }
-    return true;
+    return std::all_of(parameters, parameters + M::traits.parameter_count, finite) &&
+           std::all_of(coefficients, coefficients + M::traits.coefficient_count, finite);
   });
 }
 

@@ -9,20 +9,25 @@
 namespace swarmfit::kernels {
 
 /// The values are shared with shaders/layout.h.
-enum class ModelKind : std::uint32_t { line2d = 0, plane = 1 };
+enum class ModelKind : std::uint32_t { line2d = 0, plane = 1, circle2d = 2, sphere = 3, cylinder = 4, homography = 5, fundamental = 6 };
 
-inline constexpr ModelKind kModelKinds[] = {ModelKind::line2d, ModelKind::plane};
+inline constexpr ModelKind kModelKinds[] = {ModelKind::line2d,   ModelKind::plane,      ModelKind::circle2d,   ModelKind::sphere,
+                                            ModelKind::cylinder, ModelKind::homography, ModelKind::fundamental};
 
 /// The most parameters and coefficients any kind has, and columns any point has.
-inline constexpr int kMaxParameters = 12;
+inline constexpr int kMaxParameters = 9;
+inline constexpr int kMaxCoefficients = 18;
 inline constexpr int kMaxDimension = 4;
+
+/// Multiply-adds that a division or a square root is counted as.
+inline constexpr int kSlowOperation = 4;
 
 struct ModelTraits {
   std::string_view name;
   int dimension = 0;          ///< columns of a point
   int parameter_count = 0;    ///< doubles in the data's frame, as results give them
   int coefficient_count = 0;  ///< scalars in the centred frame, as kernels read them
-  int multiply_adds = 0;      ///< fused multiply-adds of one residual: what the machine's limit is divided by
+  int multiply_adds = 0;      ///< fused multiply-adds one residual is worth: what the machine's limit is divided by
   bool affine = false;        ///< the residual is n . x + offset with coefficients n, offset: boxes bound it
 };
 
@@ -30,7 +35,8 @@ const ModelTraits& traits(ModelKind kind) noexcept;
 std::optional<ModelKind> model_kind(std::string_view name) noexcept;
 
 /// Parameters in the data's frame to a kernel's coefficients in the frame centred at `centre`.
-/// parameters: parameter_count, centre: dimension, coefficients: coefficient_count. Returns false if a coefficient is not finite.
+/// parameters: parameter_count, centre: dimension, coefficients: coefficient_count. Returns false if a parameter or a coefficient is not
+/// finite.
 bool centred_coefficients(ModelKind kind, const double* parameters, const double* centre, double* coefficients) noexcept;
 
 }  // namespace swarmfit::kernels

@@ -15,8 +15,14 @@ namespace {
 #include "kernels/models/models.inl"
 
 struct ScalarMath {
+  double add(double a, double b) const { return a + b; }
+  double sub(double a, double b) const { return a - b; }
+  double mul(double a, double b) const { return a * b; }
+  double div(double a, double b) const { return a / b; }
+  double sqrt(double a) const { return std::sqrt(a); }
   double mul_add(double a, double b, double c) const { return a * b + c; }
-  double set(double v) const { return v; }
+  double neg_mul_add(double a, double b, double c) const { return c - a * b; }
+  double ratio(double a, double b) const { return b > 0 ? a / b : std::numeric_limits<double>::infinity(); }
 };
 
 class ReferenceEvaluator final : public FitnessEvaluator {
@@ -58,7 +64,7 @@ class ReferenceEvaluator final : public FitnessEvaluator {
   Result<> distances(const ModelView& model, std::span<float> distances) override {
     if (auto ok = check_model(model, dimension_); !ok) return ok;
     if (auto ok = check_size("distances.size()", distances.size(), extent_.finite.size()); !ok) return ok;
-    double k[kMaxParameters];
+    double k[kMaxCoefficients];
     const bool finite = centred_coefficients(model.kind, model.parameters.data(), extent_.centre, k);
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (!extent_.finite[i]) {
@@ -75,7 +81,7 @@ class ReferenceEvaluator final : public FitnessEvaluator {
     std::fill(labels.begin(), labels.end(), std::uint16_t{0});
     std::vector<double> nearest(labels.size(), std::numeric_limits<double>::infinity());
     for (std::size_t m = 0; m < models.size(); ++m) {
-      double k[kMaxParameters];
+      double k[kMaxCoefficients];
       if (!centred_coefficients(models[m].kind, models[m].parameters.data(), extent_.centre, k)) continue;
       for (std::size_t i = 0; i < labels.size(); ++i) {
         if (!extent_.finite[i]) continue;
@@ -94,12 +100,14 @@ class ReferenceEvaluator final : public FitnessEvaluator {
  private:
   double* row(std::size_t i) { return centred_.data() + i * static_cast<std::size_t>(dimension_); }
 
+  /// What overflows to no number is out of any reach.
   double distance(ModelKind kind, std::size_t i, const double* k) {
-    return visit_model(kind, [&]<class M>() { return std::abs(M::residual(ScalarMath{}, row(i), k)); });
+    const double d = visit_model(kind, [&]<class M>() { return std::abs(M::residual(ScalarMath{}, row(i), k)); });
+    return std::isnan(d) ? std::numeric_limits<double>::infinity() : d;
   }
 
   double cost(const ModelView& model, Loss loss) {
-    double k[kMaxParameters];
+    double k[kMaxCoefficients];
     if (!centred_coefficients(model.kind, model.parameters.data(), extent_.centre, k)) {
       return std::numeric_limits<double>::infinity();
     }

@@ -8,8 +8,7 @@
 namespace swarmfit::kernels::vulkan {
 namespace {
 
-static_assert(Commands::kModelBytes == sizeof(float) * layout::kCoefficientStride);
-static_assert(kMaxParameters <= static_cast<int>(layout::kKindSlot) && kMaxDimension == static_cast<int>(layout::kMaxColumns));
+static_assert(kMaxCoefficients <= static_cast<int>(layout::kKindSlot) && kMaxDimension == static_cast<int>(layout::kMaxColumns));
 static_assert(static_cast<std::uint32_t>(Loss::truncated_l1) == layout::kLossL1);
 static_assert(static_cast<std::uint32_t>(Loss::truncated_l2) == layout::kLossL2);
 
@@ -142,7 +141,7 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
 }
 
 void Commands::costs(ModelKind kind, Loss loss, std::span<float> costs) {
-  const TileShape shape = tile_shape(device_.traits(), costs.size());
+  const TileShape shape = tile_shape(device_.traits(), costs.size(), traits(kind).coefficient_count);
   reserve_particles(shape.padded());
   const Key key{kind, loss, shape.tile, shape.tiles};
   auto commands = recorded_.find(key);
@@ -166,8 +165,8 @@ void Commands::distances(ModelKind kind) {
   run_map(wanted, 1, 0);
 }
 
-void Commands::assign(std::size_t models, float tolerance) {
-  Specialisation wanted{.shader = Shader::assign, .group = cloud_->shape().group};
+void Commands::assign(std::uint32_t kind, std::size_t models, float tolerance) {
+  Specialisation wanted{.shader = Shader::assign, .group = cloud_->shape().group, .model = kind};
   wanted.dimension = static_cast<std::uint32_t>(dimension_);
   run_map(wanted, models, tolerance);
 }

@@ -7,6 +7,7 @@
 
 #include "kernels/vulkan/cloud.hpp"
 #include "kernels/vulkan/pipelines.hpp"
+#include "shaders/layout.h"
 
 namespace swarmfit::kernels::vulkan {
 
@@ -29,10 +30,11 @@ class Commands {
   void costs(ModelKind kind, Loss loss, std::span<float> costs);
   /// Fills each segment's output, mapped, with floats.
   void distances(ModelKind kind);
-  /// Fills each segment's output with 32-bit labels. A negative tolerance: each point has its own.
-  void assign(std::size_t models, float tolerance);
+  /// Fills each segment's output with 32-bit labels. `kind` is that of all models, or layout::kAnyModel. A negative tolerance: each point
+  /// has its own.
+  void assign(std::uint32_t kind, std::size_t models, float tolerance);
 
-  static constexpr std::size_t kModelBytes = 64;
+  static constexpr std::size_t kModelBytes = sizeof(float) * layout::kCoefficientStride;
 
  private:
   using Key = std::tuple<ModelKind, Loss, std::uint32_t, std::uint32_t>;

@@ -11,7 +11,8 @@ std::uint32_t ceil_div(std::size_t a, std::size_t b) { return static_cast<std::u
 }  // namespace
 
 // A software device runs a subgroup as one SIMD register and pays dearly for every load, so one load must serve many particles,
-// and a chunk must be long to make up for filling the tile. A GPU wants many groups, each light on registers.
+// and a chunk must be long to make up for filling the tile. A GPU wants many groups, each light on registers. Full tiles are those of kinds
+// with four coefficients; others hold no more coefficients than that, but four particles at least.
 std::uint32_t largest_tile(const DeviceTraits& device) { return device.software ? 32 : 16; }
 
 ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimension) {
@@ -28,9 +29,10 @@ ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimen
   return shape;
 }
 
-TileShape tile_shape(const DeviceTraits& device, std::size_t particles) {
+TileShape tile_shape(const DeviceTraits& device, std::size_t particles, int coefficients) {
   TileShape shape;
-  const std::uint32_t most = largest_tile(device);
+  const std::uint32_t registers = 4 * largest_tile(device);
+  const std::uint32_t most = std::clamp(std::bit_floor(registers / static_cast<std::uint32_t>(coefficients)), 4U, largest_tile(device));
   shape.tiles = std::max(1U, ceil_div(particles, most));
   // Even tiles, in steps of 4 so that few pipelines are needed, waste little of the last one.
   shape.tile = std::min(most, (ceil_div(particles, shape.tiles) + 3) / 4 * 4);

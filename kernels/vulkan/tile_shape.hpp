@@ -16,15 +16,15 @@ struct ChunkShape {
 };
 ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimension);
 
-/// How the particles are cut: into `tiles` of `tile` each, the last one padded.
+/// How the particles, of so many coefficients each, are cut: into `tiles` of `tile` each, the last one padded.
 struct TileShape {
   std::uint32_t tile = 0;
   std::uint32_t tiles = 0;
   std::uint32_t padded() const noexcept { return tile * tiles; }
 };
-TileShape tile_shape(const DeviceTraits& device, std::size_t particles);
+TileShape tile_shape(const DeviceTraits& device, std::size_t particles, int coefficients);
 
-/// Particles a tile may have at most.
+/// Particles a tile may have at most; smaller ones divide it.
 std::uint32_t largest_tile(const DeviceTraits& device);
 
 }  // namespace swarmfit::kernels::vulkan

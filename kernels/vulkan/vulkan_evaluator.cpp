@@ -115,7 +115,7 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
     commands_.costs(swarm.kind, loss, costs);
   }
   for (std::size_t j = 0; j < swarm.count; ++j) {
-    double k[kMaxParameters];
+    double k[kMaxCoefficients];
     if (!centred_coefficients(swarm.kind, swarm.parameters.data() + j * width, cloud_.extent().centre, k)) {
       costs[j] = std::numeric_limits<float>::infinity();
     }
@@ -124,7 +124,7 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
 
 /// Returns false, and writes zeros, if a coefficient is not finite.
 bool VulkanEvaluator::write_model(ModelKind kind, const double* parameters, std::span<float> row) const {
-  double k[kMaxParameters];
+  double k[kMaxCoefficients];
   const bool finite = centred_coefficients(kind, parameters, cloud_.extent().centre, k);
   std::fill(row.begin(), row.end(), 0.0F);
   // What float cannot hold is farther away than any point either way.
@@ -180,7 +180,9 @@ Result<> VulkanEvaluator::assign(std::span<const ModelView> models, std::span<co
       ++written;
     }
     if (tolerance.size() > 1) cloud_.write_tolerance(tolerance);
-    commands_.assign(written, tolerance.size() > 1 ? -1.0F : tolerance[0]);
+    const auto first = models.front().kind;
+    const bool alike = std::all_of(models.begin(), models.end(), [&](const ModelView& model) { return model.kind == first; });
+    commands_.assign(alike ? static_cast<std::uint32_t>(first) : layout::kAnyModel, written, tolerance.size() > 1 ? -1.0F : tolerance[0]);
     read_output<std::uint32_t>(labels);
     return {};
   });

@@ -1,0 +1,38 @@
+// What circle2d and sphere share: a centre and a radius in D dimensions. Included by models.inl only.
+//
+// Let a and b be the ends of the diameter that points at the origin. By Thales, (x - a) . (x - b) = |x - c|^2 - r^2, so the distance is
+// that over |x - c| + r. Unlike |x - c| - r it subtracts nothing large: floats hold it for spheres of any size, flat ones as well.
+template <int D>
+struct Ball {
+  /// a, b, c, r. A radius counts by its size; what is farther off or flatter than float can tell is kept where squares do not overflow.
+  static constexpr int coefficient_count = 3 * D + 1;
+
+  static void centre(const double* p, const double* c, double* k) {
+    constexpr double kFar = 1e15, kPoint = 1e-30;
+    double offset[D], length = 0;
+    for (int d = 0; d < D; ++d) length = std::hypot(length, offset[d] = p[d] - c[d]);
+    const double near = std::clamp(length - std::abs(p[D]), -kFar, kFar);
+    const double radius = std::clamp(std::abs(p[D]), kPoint, kFar);
+    for (int d = 0; d < D; ++d) {
+      const double direction = length > 0 ? offset[d] / length : (d == 0 ? 1.0 : 0.0);
+      k[d] = near * direction;
+      k[D + d] = (near + 2 * radius) * direction;
+      k[2 * D + d] = (near + radius) * direction;
+    }
+    k[3 * D] = radius;
+  }
+
+  /// Signed orthogonal distance, negative inside. 5 D + 1 multiply-adds, a square root and a division.
+  template <class Math, class V>
+  static SWARMFIT_INLINE V residual(const Math m, const V* x, const V* k) {
+    V power = m.mul(m.sub(x[0], k[0]), m.sub(x[0], k[D]));
+    V from_centre = m.sub(x[0], k[2 * D]);
+    V square = m.mul(from_centre, from_centre);
+    for (int d = 1; d < D; ++d) {
+      power = m.mul_add(m.sub(x[d], k[d]), m.sub(x[d], k[D + d]), power);
+      from_centre = m.sub(x[d], k[2 * D + d]);
+      square = m.mul_add(from_centre, from_centre, square);
+    }
+    return m.div(power, m.add(m.sqrt(square), k[3 * D]));
+  }
+};
