@@ -38,8 +38,8 @@ std::vector<std::string>& validation_messages();
 /// Back ends whose absence is a failure (--require-backend), and what was skipped.
 std::set<std::string>& required_backends();
 std::set<std::string>& skipped();
-/// Largest |cost - reference| / cost of a model that explains nothing, by contender and kind.
-void note_error(const std::string& contender, ModelKind kind, double relative);
+/// Largest |cost - reference| / cost of a model that explains nothing, by contender and what was evaluated.
+void note_error(const std::string& contender, const std::string& what, double relative);
 void print_summary();
 
 /// A cloud with its caps, packed rows of doubles or floats.
@@ -68,6 +68,8 @@ class Random {
 
 /// Points for `kind`: six in ten close to one model, the others anywhere within `size` of `middle`; caps around a hundredth of `size`.
 Cloud make_cloud(ModelKind kind, std::size_t count, double middle = 3, double size = 2, bool float32 = true);
+/// How many points a test of all sizes takes: around every vector, tile and chunk; a few of each for the kinds whose residuals are dear.
+std::vector<std::size_t> sizes(ModelKind kind);
 /// Models through the cloud: half near the one its points follow, half anywhere. Parameters row after row.
 std::vector<double> make_swarm(ModelKind kind, std::size_t count, double middle = 3, double size = 2);
 

@@ -150,6 +150,11 @@ Cloud make_cloud(ModelKind kind, std::size_t count, double middle, double size, 
   return cloud;
 }
 
+std::vector<std::size_t> sizes(ModelKind kind) {
+  if (!traits(kind).affine) return {1, 2, 17, 128, 20011};
+  return {1, 2, 3, 15, 16, 17, 127, 128, 129, 65535, 65537, 307200};
+}
+
 std::vector<double> make_swarm(ModelKind kind, std::size_t count, double middle, double size) {
   Random random(count + 99);
   std::vector<double> swarm;

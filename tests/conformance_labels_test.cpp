@@ -62,12 +62,6 @@ std::vector<ModelView> views(ModelKind kind, const std::vector<double>& swarm) {
   return models;
 }
 
-/// Of the dear kinds, no large ones.
-std::vector<std::size_t> sizes(ModelKind kind) {
-  if (!traits(kind).affine) return {1, 3, 16, 129, 20011};
-  return {1, 2, 3, 15, 16, 17, 127, 128, 129, 65535, 65537, 307200};
-}
-
 TEST_P(Labels, DistancesAgreeOnAllSizes) {
   for (const ModelKind kind : kModelKinds) {
     for (const std::size_t points : sizes(kind)) {
