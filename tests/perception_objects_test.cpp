@@ -91,7 +91,7 @@ TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {
   auto scene = perceive({{{-0.3, 0, 0.03}, {0.03, 0.03, 0.03}}, {{0.25, 0.1, 0.1}, {0.1, 0.05, 0.1}, 0.6}});
   const std::vector<int> models{3};
   auto labels = scene.objects;
-  const auto spaces = make_spaces(scene.grid, models, 100, 1.2, labels);
+  const auto spaces = make_spaces(scene.grid, models, 100, 1.2, 0, labels);
   ASSERT_EQ(spaces.size(), 2u);
   EXPECT_GT(spaces[0].points, spaces[1].points);
   const auto large = test::agreement(scene.rendering.truth, 3, labels.of_point);
@@ -105,7 +105,7 @@ TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {
     EXPECT_EQ(soi.plane, 3);
   }
   EXPECT_LT(spaces[0].radius, 1.2 * 1.25 * std::sqrt(0.01 + 0.0025 + 0.01));
-  EXPECT_TRUE(make_spaces(scene.grid, models, 1000000, 1.2, labels).empty());
+  EXPECT_TRUE(make_spaces(scene.grid, models, 1000000, 1.2, 0, labels).empty());
   EXPECT_EQ(std::count(labels.of_point.begin(), labels.of_point.end(), 0), static_cast<std::ptrdiff_t>(labels.of_point.size()));
 }
 

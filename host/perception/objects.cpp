@@ -15,7 +15,6 @@ constexpr double kIslandShare = 0.9;  // of an island's border that one object h
 constexpr int kIslandReach = 5;       // [cells] holes between an island and what encloses it
 constexpr int kIslandCells = 12;      // smaller ones are noise
 constexpr int kRowsAtOnce = 16;       // that one thread works on
-constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
 
 /// Which object each cell belongs to, and where that is clear for all of its points.
 struct CellObjects {
@@ -120,27 +119,66 @@ Thumbnail shrink(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
   return thumb;
 }
 
-/// The object that encloses the island, or 0. `island` marks the island's cells with `mark`.
-std::uint16_t enclosing(const Thumbnail& thumb, const std::vector<int>& island, int mark, const std::vector<std::uint32_t>& cells) {
-  std::map<std::uint16_t, std::size_t> borders;  // 0: anything that is no object
-  std::size_t total = 0;
-  for (const auto at : cells) {
-    const int u0 = static_cast<int>(at) % thumb.width, v0 = static_cast<int>(at) / thumb.width;
-    for (const auto& [du, dv] : kAround) {
-      std::uint16_t met = 0;
-      bool inside = false;
-      for (int reach = 1; reach <= kIslandReach && met == 0 && !inside; ++reach) {
-        const int u = u0 + reach * du, v = v0 + reach * dv;
-        if (u < 0 || v < 0 || u >= thumb.width || v >= thumb.height) break;
-        const auto to = static_cast<std::size_t>(v * thumb.width + u);
-        inside = island[to] == mark;
-        met = thumb.object[to];
-      }
-      if (inside) continue;
-      ++borders[met];
-      ++total;
+/// A stretch of support in one row, [first, last), and the island it belongs to.
+struct Run {
+  int row, first, last, island;
+};
+
+/// Islands of support: runs that touch in neighbouring rows. `size[k]`: cells of the k-th island.
+std::vector<Run> find_islands(const Thumbnail& thumb, std::vector<int>& size) {
+  std::vector<Run> runs;
+  std::vector<int> parent;
+  const auto root = [&](int k) {
+    while (parent[static_cast<std::size_t>(k)] != k) k = parent[static_cast<std::size_t>(k)];
+    return k;
+  };
+  std::size_t above = 0, row_start = 0;  // first run of the row above that may still touch, and of this row
+  for (int v = 0; v < thumb.height; ++v) {
+    above = row_start;
+    row_start = runs.size();
+    const std::uint8_t* support = &thumb.support[static_cast<std::size_t>(v) * static_cast<std::size_t>(thumb.width)];
+    for (int u = 0; u < thumb.width; ++u) {
+      if (support[u] == 0) continue;
+      const int first = u;
+      while (u < thumb.width && support[u] != 0) ++u;
+      const int own = static_cast<int>(parent.size());
+      parent.push_back(own);
+      runs.push_back({v, first, u, own});
+      while (above < row_start && (runs[above].row + 1 < v || runs[above].last <= first)) ++above;
+      for (std::size_t k = above; k < row_start && runs[k].first < u; ++k)
+        parent[static_cast<std::size_t>(root(runs[k].island))] = root(own);
     }
   }
+  size.assign(parent.size(), 0);
+  for (Run& run : runs) {
+    run.island = root(run.island);
+    size[static_cast<std::size_t>(run.island)] += run.last - run.first;
+  }
+  return runs;
+}
+
+/// The object that encloses the island, or 0. `island` marks the island's cells with `mark`.
+std::uint16_t enclosing(const Thumbnail& thumb, const std::vector<int>& island, int mark, const std::vector<Run>& runs) {
+  constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  std::map<std::uint16_t, std::size_t> borders;  // 0: anything that is no object
+  std::size_t total = 0;
+  const auto look = [&](int u0, int v0, int du, int dv) {
+    for (int reach = 1; reach <= kIslandReach; ++reach) {
+      const int u = u0 + reach * du, v = v0 + reach * dv;
+      if (u < 0 || v < 0 || u >= thumb.width || v >= thumb.height) break;
+      const auto to = static_cast<std::size_t>(v * thumb.width + u);
+      if (island[to] == mark) return;
+      if (thumb.object[to] == 0) continue;
+      ++borders[thumb.object[to]];
+      ++total;
+      return;
+    }
+    ++borders[0];
+    ++total;
+  };
+  for (const Run& run : runs)
+    for (int u = run.first; u < run.last; ++u)
+      for (const auto& [du, dv] : kAround) look(u, run.row, du, dv);
   for (const auto& [object, length] : borders)
     if (object != 0 && static_cast<double>(length) >= kIslandShare * static_cast<double>(total)) return object;
   return 0;
@@ -175,29 +213,23 @@ void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
   const auto thumb = shrink(grid, on_support, objects);
   std::vector<std::size_t> size(objects.support.size() + 1, 0);
   for (const auto o : thumb.object) ++size[o];
-  std::vector<int> island(thumb.object.size(), 0);
+  const std::size_t largest = *std::max_element(size.begin() + 1, size.end());
+  std::vector<int> cells;
+  const auto runs = find_islands(thumb, cells);
+  // A support that is larger than any object is enclosed by none; most are.
+  std::map<int, std::vector<Run>> islands;
+  std::vector<int> island(thumb.object.size(), -1);
+  for (const Run& run : runs) {
+    const int count = cells[static_cast<std::size_t>(run.island)];
+    if (count < kIslandCells || static_cast<std::size_t>(count) > largest) continue;
+    islands[run.island].push_back(run);
+    std::fill_n(island.begin() + run.row * thumb.width + run.first, run.last - run.first, run.island);
+  }
   std::vector<std::uint16_t> filled(thumb.object.size(), 0);
-  std::vector<std::uint32_t> cells;
-  int islands = 0;
-  for (std::size_t seed = 0; seed < island.size(); ++seed) {
-    if (thumb.support[seed] == 0 || island[seed] != 0) continue;
-    island[seed] = ++islands;
-    cells.assign(1, static_cast<std::uint32_t>(seed));
-    for (std::size_t next = 0; next < cells.size(); ++next) {
-      const int u0 = static_cast<int>(cells[next]) % thumb.width, v0 = static_cast<int>(cells[next]) / thumb.width;
-      for (const auto& [du, dv] : kAround) {
-        const int u = u0 + du, v = v0 + dv;
-        if (u < 0 || v < 0 || u >= thumb.width || v >= thumb.height) continue;
-        const auto to = static_cast<std::size_t>(v * thumb.width + u);
-        if (thumb.support[to] == 0 || island[to] != 0) continue;
-        island[to] = islands;
-        cells.push_back(static_cast<std::uint32_t>(to));
-      }
-    }
-    if (static_cast<int>(cells.size()) < kIslandCells) continue;
-    const auto object = enclosing(thumb, island, islands, cells);
-    if (object == 0 || cells.size() > size[object]) continue;
-    for (const auto at : cells) filled[at] = object;
+  for (const auto& [number, parts] : islands) {
+    const auto object = enclosing(thumb, island, number, parts);
+    if (object == 0 || static_cast<std::size_t>(cells[static_cast<std::size_t>(number)]) > size[object]) continue;
+    for (const Run& run : parts) std::fill_n(filled.begin() + run.row * thumb.width + run.first, run.last - run.first, object);
   }
   for (std::size_t at = 0; at < filled.size(); ++at) {
     if (filled[at] == 0) continue;
@@ -211,7 +243,7 @@ void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
 }
 
 std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const int> models, std::size_t min_points, double margin,
-                                         ObjectLabels& objects) {
+                                         int threads, ObjectLabels& objects) {
   std::vector<std::vector<std::uint32_t>> members(objects.support.size());
   for (std::size_t i = 0; i < grid.size(); ++i)
     if (objects.of_point[i] != 0) members[objects.of_point[i] - 1u].push_back(static_cast<std::uint32_t>(i));
@@ -221,19 +253,22 @@ std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const 
   // What is large and near takes up most of the view.
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return members[a].size() > members[b].size(); });
 
-  std::vector<SpaceOfInterest> spaces;
+  std::vector<SpaceOfInterest> spaces(order.size());
+  in_parallel(static_cast<int>(order.size()), 1, threads, [&](int first, int last) {
+    for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k) {
+      SpaceOfInterest& soi = spaces[k];
+      bounding_sphere(grid, members[order[k]], soi);
+      soi.radius *= margin;
+      soi.points = members[order[k]].size();
+      soi.plane = models[static_cast<std::size_t>(objects.support[order[k]])];
+      if (grid.organised()) soi.bbox = bounding_box(grid, members[order[k]]);
+    }
+  });
   std::vector<int> support;
   std::vector<std::uint16_t> number(members.size() + 1, 0);
-  for (const auto k : order) {
-    SpaceOfInterest soi;
-    bounding_sphere(grid, members[k], soi);
-    soi.radius *= margin;
-    soi.points = members[k].size();
-    soi.plane = models[static_cast<std::size_t>(objects.support[k])];
-    if (grid.organised()) soi.bbox = bounding_box(grid, members[k]);
-    spaces.push_back(std::move(soi));
-    support.push_back(objects.support[k]);
-    number[k + 1] = static_cast<std::uint16_t>(spaces.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    support.push_back(objects.support[order[k]]);
+    number[order[k] + 1] = static_cast<std::uint16_t>(k + 1);
   }
   for (auto& o : objects.of_point) o = number[o];
   objects.support = std::move(support);

@@ -30,6 +30,6 @@ void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
 /// The spaces of interest, those that take up most of the view first, and `objects` renumbered so. Objects with fewer than
 /// `min_points` are debris and dropped. `models[s]`: 1-based model of surface s.
 std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const int> models, std::size_t min_points, double margin,
-                                         ObjectLabels& objects);
+                                         int threads, ObjectLabels& objects);
 
 }  // namespace swarmfit::perception

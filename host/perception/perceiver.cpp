@@ -135,7 +135,7 @@ void Perceiver::State::find_objects(const PointGrid& grid, const std::vector<Sur
   }
   std::vector<int> models;
   for (const auto& surface : supports) models.push_back(surface.model);
-  result.sois = perception::make_spaces(grid, models, min_points, options.soi_margin, objects);
+  result.sois = perception::make_spaces(grid, models, min_points, options.soi_margin, options.fit.threads, objects);
   result.popout = std::move(objects.of_point);
 }
 

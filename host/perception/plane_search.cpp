@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Eigenvalues>
+
 #include "host/perception/parallel.hpp"
 
 namespace swarmfit::perception {
@@ -14,6 +16,7 @@ constexpr double kAgreement = 0.5;       // share of a plane's cells that lie al
 constexpr double kContrast = 2;          // of the density in a surface to that around it
 constexpr std::size_t kFewCells = 10;    // fewer flat cells hold no surface
 constexpr float kFringeOfPlane = 0.06f;  // [m] a surface reaches this far beyond the cells that tell its direction
+constexpr float kNoise = 0.0045f;        // [1 / m] three deviations of a depth, over the range squared
 constexpr int kPointsAtOnce = 16384;     // of a range that one thread works on
 constexpr double kExtentMargin = 0.02;   // [m] things stand a little over the edge of what is seen of a table
 
@@ -76,6 +79,55 @@ std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vect
     }
   }
   return labels;
+}
+
+/// Least squares over the cells with this label, the normal on the old one's side.
+LocalPlane refit(const Overview& overview, const std::vector<std::uint16_t>& labels, std::uint16_t label, const LocalPlane& old) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  double count = 0;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (labels[i] != label) continue;
+    mean += overview.cells.points[i].cast<double>();
+    ++count;
+  }
+  mean /= count;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (labels[i] != label) continue;
+    const Eigen::Vector3d d = overview.cells.points[i].cast<double>() - mean;
+    spread += d * d.transpose();
+  }
+  Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
+  if (normal.dot(old.normal.cast<double>()) < 0) normal = -normal;
+  return {normal.cast<float>(), static_cast<float>(-normal.dot(mean))};
+}
+
+/// Far off a wavy depth gives one floor two planes. The smaller joins the larger where most of its cells lie within tau, or the sensor's noise
+/// at their range, of that.
+void join_alike(const Overview& overview, float tau, std::vector<std::uint16_t>& labels, std::vector<LocalPlane>& planes,
+                std::vector<Model>& models) {
+  const auto lies_in = [&](std::size_t small, std::size_t large) {
+    std::size_t cells = 0, within = 0;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      if (labels[i] != small + 1) continue;
+      const auto& p = overview.cells.points[i];
+      ++cells;
+      within += std::abs(planes[large].height(p)) <= std::max(tau, kNoise * p.squaredNorm()) ? 1 : 0;
+    }
+    return cells > 0 && 2 * within > cells;
+  };
+  for (std::size_t large = 0; large < planes.size(); ++large)
+    for (std::size_t small = 0; small < planes.size(); ++small) {
+      if (small == large || models[small].inliers > models[large].inliers || !lies_in(small, large)) continue;
+      for (auto& label : labels) label = label == small + 1 ? static_cast<std::uint16_t>(large + 1) : label;
+      planes[large] = refit(overview, labels, static_cast<std::uint16_t>(large + 1), planes[large]);
+      models[large].parameters << planes[large].normal.cast<double>(), static_cast<double>(planes[large].offset);
+      models[large].inliers += models[small].inliers;
+      for (auto& label : labels) label -= label > small + 1 ? 1 : 0;
+      planes.erase(planes.begin() + static_cast<std::ptrdiff_t>(small));
+      models.erase(models.begin() + static_cast<std::ptrdiff_t>(small));
+      return join_alike(overview, tau, labels, planes, models);
+    }
 }
 
 /// The surface from the cells that tell its direction, widened by the cells around them that lie in it.
@@ -240,7 +292,8 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
   fit.models = std::move(models);
   if (too_small) fit.stop_reason = "no plane of reasonable size is left";
 
-  const auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
+  auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
+  if (overview.has_normals()) join_alike(overview, static_cast<float>(fit.threshold), labels, planes, fit.models);
   std::vector<Surface> surfaces;
   for (std::size_t k = 0; k < planes.size(); ++k)
     surfaces.push_back(grow_surface(overview, labels, static_cast<int>(k + 1), planes[k], static_cast<float>(fit.threshold)));

@@ -1,7 +1,6 @@
 #include "host/perception/popout.hpp"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <unordered_map>
 
@@ -52,14 +51,7 @@ void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, 
 class GridFlood {
  public:
   GridFlood(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result)
-      : grid_(grid), surfaces_(surfaces), options_(options), result_(result) {
-    const int hole = std::max(1, kHole * grid.width / 640);
-    int k = 0;
-    for (const int step : {1, hole + 1})
-      for (int dv = -1; dv <= 1; ++dv)
-        for (int du = -1; du <= 1; ++du)
-          if (du != 0 || dv != 0) offsets_[static_cast<std::size_t>(k++)] = {du * step, dv * step};
-  }
+      : grid_(grid), surfaces_(surfaces), options_(options), result_(result), hole_(std::max(1, kHole * grid.width / 640)) {}
 
   bool is_seed(std::size_t i) const { return result_.sure[i] != 0; }
 
@@ -82,23 +74,29 @@ class GridFlood {
     const auto& p = grid_.points[at];
     const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[at])];
     const float step = flood_step_at(grid_, surface.noise, options_.flood_step, PointGrid::range(p));
-    for (const auto& [du, dv] : offsets_) {
-      const int x = u + du, y = v + dv;
-      if (x < 0 || y < 0 || x >= grid_.width || y >= grid_.height) continue;
+    const auto reach = [&](int x, int y, bool across_hole) {
+      if (x < 0 || y < 0 || x >= grid_.width || y >= grid_.height) return true;
       const auto to = static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.width) + static_cast<std::size_t>(x);
-      if (result_.above[to] != result_.above[at] || result_.group[to] != 0) continue;
-      if ((grid_.points[to] - p).squaredNorm() > step * step) continue;
-      if (!is_seed(to) && (du * du > 1 || dv * dv > 1)) continue;
+      if (result_.group[to] == mark) return is_seed(to);
+      if (result_.above[to] != result_.above[at] || result_.group[to] != 0) return false;
+      if ((grid_.points[to] - p).squaredNorm() > step * step || (across_hole && !is_seed(to))) return false;
       result_.group[to] = mark;
       members_.push_back(static_cast<std::uint32_t>(to));
-    }
+      return is_seed(to);
+    };
+    for (int dv = -1; dv <= 1; ++dv)
+      for (int du = -1; du <= 1; ++du) {
+        if (du == 0 && dv == 0) continue;
+        // What spreads from the neighbour in that direction need not be jumped to.
+        if (!reach(u + du, v + dv, false)) reach(u + du * (hole_ + 1), v + dv * (hole_ + 1), true);
+      }
   }
 
   const PointGrid& grid_;
   std::span<const Surface> surfaces_;
   const PopoutOptions& options_;
   Popout& result_;
-  std::array<std::array<int, 2>, 16> offsets_{};
+  int hole_;  // [px]
   std::vector<std::uint32_t> members_;
 };
 

@@ -15,7 +15,7 @@ namespace {
 constexpr double kUncertainCost = 0.35;  // of the third label
 constexpr double kSmoothness = 0.02;     // of a boundary between two pixels side by side
 constexpr double kSpatialReach = 0.25;   // of the rectangle's shorter side: there the spatial cost is 1
-constexpr std::size_t kLargestSample = 256;
+constexpr std::size_t kLargestSample = 512;
 constexpr int kColourBits = 5;
 constexpr int kCycles = 5;
 

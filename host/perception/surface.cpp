@@ -202,6 +202,7 @@ void lay_out_cells(const PointGrid& grid, const std::vector<std::uint32_t>& memb
   surface.low = low - Eigen::Vector2f::Constant(pad);
   const Eigen::Vector2f size = high - low + Eigen::Vector2f::Constant(2 * pad);
   surface.cell = std::max(kCell, size.maxCoeff() / kMostCells);
+  surface.per_metre = 1 / surface.cell;
   surface.columns = static_cast<int>(size.x() / surface.cell) + 1;
   surface.rows = static_cast<int>(size.y() / surface.cell) + 1;
 }

@@ -15,7 +15,8 @@ struct Surface {
   int model = 0;  ///< 1-based index into the fit's models
   Eigen::Vector3f axis_a = Eigen::Vector3f::UnitX(), axis_b = Eigen::Vector3f::UnitY();
   Eigen::Vector2f low = Eigen::Vector2f::Zero();
-  float cell = 0;  ///< [m]
+  float cell = 0;       ///< [m]
+  float per_metre = 0;  ///< cells, 1 / cell
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> extent;     ///< 2 well within a surface's hull, 1 at its edge and in the margin, row after row
   std::vector<std::uint8_t> component;  ///< 1 on cells of a kept surface, without the hull; what is connected with the plane
@@ -26,7 +27,7 @@ struct Surface {
 
   /// Its place in the bitmap, or -1 outside.
   int cell_of(const Eigen::Vector3f& p) const noexcept {
-    const float a = (axis_a.dot(p) - low.x()) / cell, b = (axis_b.dot(p) - low.y()) / cell;
+    const float a = (axis_a.dot(p) - low.x()) * per_metre, b = (axis_b.dot(p) - low.y()) * per_metre;
     if (!(a >= 0 && b >= 0 && a < static_cast<float>(columns) && b < static_cast<float>(rows))) return -1;
     return static_cast<int>(b) * columns + static_cast<int>(a);
   }
