@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 #include <limits>
 
 #include <swarmfit/perception.hpp>
@@ -29,6 +31,46 @@ Expected<PerceiveResult> perceive(const Cloud& cloud, const PerceiveOptions& opt
 
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::acos(std::clamp(std::abs(a.normalized().dot(b.normalized())), 0.0, 1.0)) * 57.29577951308232;
+}
+
+/// A floor 1.6 m below a camera that looks down on it, its heights in two steps, as structured light gives them far off.
+Cloud stepped_floor(double step) {
+  Cloud cloud;
+  cloud.width = 320;
+  cloud.height = 240;
+  const Eigen::Vector3d up(0, -std::cos(0.7), -std::sin(0.7));
+  for (int v = 0; v < cloud.height; ++v)
+    for (int u = 0; u < cloud.width; ++u) {
+      const Eigen::Vector3d ray((u - 159.5) / 262.5, (v - 119.5) / 262.5, 1);
+      const double below = -up.dot(ray);
+      const Eigen::Vector3d p = ray * (1.6 / below), there = ray * ((1.6 - (std::sin(7 * p.x()) > -0.5 ? step : 0)) / below);
+      for (int k = 0; k < 3; ++k) cloud.values32.push_back(below > 0.2 ? static_cast<float>(there[k]) : NAN);
+    }
+  return cloud;
+}
+
+std::ptrdiff_t supports(const PerceiveResult& result) {
+  return std::count_if(result.fit.models.begin(), result.fit.models.end(), [](const Model& m) { return m.supporting; });
+}
+
+TEST(Perceiver, AStepIsASurfaceOfItsOwnAndNoiseIsNot) {
+  const auto noise = perceive(stepped_floor(0.014));
+  ASSERT_TRUE(noise) << noise.error().message;
+  EXPECT_EQ(supports(*noise), 1);
+  const auto step = perceive(stepped_floor(0.06));
+  ASSERT_TRUE(step) << step.error().message;
+  EXPECT_EQ(supports(*step), 2);
+}
+
+TEST(Perceiver, AWavyFloorIsOneSurface) {
+  const char* data = std::getenv("SWARMFIT_DATA_DIR");
+  if (data == nullptr) GTEST_SKIP() << "SWARMFIT_DATA_DIR is not set";
+  const auto folder = std::filesystem::path(data) / "rgbd";
+  const auto frame = read_rgbd(folder / "5.color.png", folder / "5.depth.png", {612.937, 613.173, 322.549, 248.158}, 0.001);
+  if (!frame) GTEST_SKIP() << frame.error().message;
+  const auto result = perceive(*frame);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(supports(*result), 2) << "a table and the floor";
 }
 
 TEST(Perceiver, ATableWithThreeBoxes) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <Eigen/Eigenvalues>
 
@@ -81,19 +82,20 @@ std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vect
   return labels;
 }
 
-/// Least squares over the cells with this label, the normal on the old one's side.
-LocalPlane refit(const Overview& overview, const std::vector<std::uint16_t>& labels, std::uint16_t label, const LocalPlane& old) {
+/// Least squares over the cells with either label, the normal on the first one's side.
+LocalPlane fit_both(const Overview& overview, const std::vector<std::uint16_t>& labels, std::size_t one, std::size_t other,
+                    const LocalPlane& old) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   double count = 0;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    if (labels[i] != label) continue;
+    if (labels[i] != one && labels[i] != other) continue;
     mean += overview.cells.points[i].cast<double>();
     ++count;
   }
   mean /= count;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    if (labels[i] != label) continue;
+    if (labels[i] != one && labels[i] != other) continue;
     const Eigen::Vector3d d = overview.cells.points[i].cast<double>() - mean;
     spread += d * d.transpose();
   }
@@ -102,28 +104,40 @@ LocalPlane refit(const Overview& overview, const std::vector<std::uint16_t>& lab
   return {normal.cast<float>(), static_cast<float>(-normal.dot(mean))};
 }
 
-/// Far off a wavy depth gives one floor two planes. The smaller joins the larger where most of its cells lie within tau, or the sensor's noise
-/// at their range, of that.
+/// What joins two planes, where they are alike: most cells of the smaller lie within tau, or the sensor's noise at their range, of the larger,
+/// and together they have more cells within tau than the larger alone.
+std::optional<LocalPlane> common_plane(const Overview& overview, float tau, const std::vector<std::uint16_t>& labels,
+                                       const std::vector<LocalPlane>& planes, std::size_t small, std::size_t large) {
+  std::size_t cells = 0, near = 0, of_large = 0, of_both = 0;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    of_large += labels[i] == large + 1 ? 1 : 0;
+    if (labels[i] != small + 1) continue;
+    const auto& p = overview.cells.points[i];
+    ++cells;
+    near += std::abs(planes[large].height(p)) <= std::max(tau, kNoise * p.squaredNorm()) ? 1 : 0;
+  }
+  if (2 * near <= cells) return std::nullopt;
+  const LocalPlane both = fit_both(overview, labels, large + 1, small + 1, planes[large]);
+  for (std::size_t i = 0; i < labels.size(); ++i)
+    of_both += (labels[i] == small + 1 || labels[i] == large + 1) && std::abs(both.height(overview.cells.points[i])) <= tau ? 1 : 0;
+  return of_both > of_large ? std::optional(both) : std::nullopt;
+}
+
+/// Far off a wavy depth gives one floor two planes: the larger takes the smaller.
 void join_alike(const Overview& overview, float tau, std::vector<std::uint16_t>& labels, std::vector<LocalPlane>& planes,
                 std::vector<Model>& models) {
-  const auto lies_in = [&](std::size_t small, std::size_t large) {
-    std::size_t cells = 0, within = 0;
-    for (std::size_t i = 0; i < labels.size(); ++i) {
-      if (labels[i] != small + 1) continue;
-      const auto& p = overview.cells.points[i];
-      ++cells;
-      within += std::abs(planes[large].height(p)) <= std::max(tau, kNoise * p.squaredNorm()) ? 1 : 0;
-    }
-    return cells > 0 && 2 * within > cells;
-  };
   for (std::size_t large = 0; large < planes.size(); ++large)
     for (std::size_t small = 0; small < planes.size(); ++small) {
-      if (small == large || models[small].inliers > models[large].inliers || !lies_in(small, large)) continue;
-      for (auto& label : labels) label = label == small + 1 ? static_cast<std::uint16_t>(large + 1) : label;
-      planes[large] = refit(overview, labels, static_cast<std::uint16_t>(large + 1), planes[large]);
-      models[large].parameters << planes[large].normal.cast<double>(), static_cast<double>(planes[large].offset);
+      if (small == large || models[small].inliers > models[large].inliers) continue;
+      const auto both = common_plane(overview, tau, labels, planes, small, large);
+      if (!both) continue;
+      planes[large] = *both;
+      models[large].parameters << both->normal.cast<double>(), static_cast<double>(both->offset);
       models[large].inliers += models[small].inliers;
-      for (auto& label : labels) label -= label > small + 1 ? 1 : 0;
+      for (auto& label : labels) {
+        if (label == small + 1) label = static_cast<std::uint16_t>(large + 1);
+        if (label > small + 1) --label;
+      }
       planes.erase(planes.begin() + static_cast<std::ptrdiff_t>(small));
       models.erase(models.begin() + static_cast<std::ptrdiff_t>(small));
       return join_alike(overview, tau, labels, planes, models);
