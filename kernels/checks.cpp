@@ -76,6 +76,33 @@ Result<> check_assign(std::span<const ModelView> models, int dimension, std::siz
   return {};
 }
 
+Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<const float> distances,
+                     std::span<const Evidence> evidence) {
+  if (auto ok = check_points(points); !ok) return ok;
+  if (!(how.tolerance > 0 && std::isfinite(how.tolerance))) {
+    return invalid(fmt::format("how.tolerance is {}, must be finite and > 0", how.tolerance));
+  }
+  if (!(how.corner > 0 && how.corner <= 1)) return invalid(fmt::format("how.corner is {}, must be in (0, 1]", how.corner));
+  if (!how.caps.empty()) {
+    if (auto size = check_size("how.caps.size()", how.caps.size(), points.count); !size) return size;
+  }
+  for (const ModelView& model : models) {
+    if (auto ok = check_model(model, points.dimension); !ok) return ok;
+  }
+  if (!distances.empty()) {
+    if (auto size = check_size("models.size()", models.size(), 1); !size) return size;
+    if (auto size = check_size("distances.size()", distances.size(), points.count); !size) return size;
+  }
+  return check_size("evidence.size()", evidence.size(), models.size());
+}
+
+Result<> check_claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<const std::uint16_t> labels,
+                     std::span<const Evidence> evidence) {
+  if (auto ok = check_points(points); !ok) return ok;
+  if (auto ok = check_assign(models, points.dimension, points.count, std::span<const float>(&tolerance, 1), labels); !ok) return ok;
+  return check_size("evidence.size()", evidence.size(), models.size());
+}
+
 Extent measure(const PointsView& points) {
   Extent extent;
   extent.finite.resize(points.count);

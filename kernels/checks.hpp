@@ -16,6 +16,11 @@ Result<> check_size(const char* field, std::size_t value, std::size_t wanted);
 Result<> check_assign(std::span<const ModelView> models, int dimension, std::size_t points, std::span<const float> tolerance,
                       std::span<const std::uint16_t> labels);
 
+Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<const float> distances,
+                     std::span<const Evidence> evidence);
+Result<> check_claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<const std::uint16_t> labels,
+                     std::span<const Evidence> evidence);
+
 /// Finite flags of a cloud and the centre that makes its coordinates small: the middle of its bounding box.
 struct Extent {
   std::vector<std::uint8_t> finite;

@@ -17,6 +17,7 @@
 #include <span>
 #include <string>
 
+#include "kernels/evidence.hpp"
 #include "kernels/models/models.hpp"
 #include "kernels/points_view.hpp"
 #include "kernels/status.hpp"
@@ -32,12 +33,6 @@ enum class Loss : std::uint32_t { truncated_l1 = 0, truncated_l2 = 1 };
 struct SwarmView {
   ModelKind kind = ModelKind::plane;
   std::size_t count = 0;
-  std::span<const double> parameters;
-};
-
-/// One model among several, perhaps of several kinds.
-struct ModelView {
-  ModelKind kind = ModelKind::plane;
   std::span<const double> parameters;
 };
 
@@ -98,6 +93,21 @@ class FitnessEvaluator {
   virtual Result<> assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) = 0;
 
   virtual Effort effort() const noexcept = 0;
+
+  // Passes over points where they lie in the caller's memory, whatever set_points was given. They are bound by that memory, so a back end
+  // that has nothing better leaves them to the processor's cores. Distances are as exact as those above; sums are taken in a fixed order.
+
+  /// Which points are finite, and their moments.
+  virtual Result<> survey(const PointsView& points, Survey& survey);
+
+  /// What the points within the tolerance of each model say of it, and if `distances` is not empty the |dist| of every point to the one
+  /// model there then is; NaN for points that are not finite. A model with a non-finite parameter has no point.
+  virtual Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
+                         std::span<Evidence> evidence);
+
+  /// Labels as `assign` gives them, and what each model's own points say of it, each with weight 1.
+  virtual Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
+                         std::span<Evidence> evidence);
 };
 
 }  // namespace swarmfit::kernels

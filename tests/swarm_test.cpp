@@ -113,7 +113,8 @@ TEST(WorkingPoints, CountsOnlyFinitePoints) {
   const std::vector<float> rows{0, 0, 0, nan, 0, 0, 1, 0, 0, 0, INFINITY, 0, 0, 1, 0};
   const models::WorkingPoints points(PointsView(std::span<const float>(rows), 3));
   EXPECT_EQ(points.finite_count(), 3U);
-  EXPECT_EQ(points.finite_index(1), 2U);
+  const std::size_t places[] = {0, 1, 2};
+  EXPECT_EQ(points.finite_at(places), (std::vector<std::uint32_t>{0, 2, 4}));
   EXPECT_FALSE(points.finite(3));
 }
 
@@ -194,7 +195,8 @@ TEST(Landscape, Equation5LessensTheFitnessAroundAnOptimum) {
 }
 
 TEST(Deflation, TakesAllWithinReachAndNothingWellBeyond) {
-  const std::vector<float> tau(5, 0.1F), distances{0.0F, 0.09F, 0.12F, 0.5F, std::nanf("")};
+  const float tau = 0.1F;
+  const std::vector<float> distances{0.0F, 0.09F, 0.12F, 0.5F, std::nanf("")};
   std::vector<float> caps{0.1F, 0.1F, 0.1F, 0.05F, 0.0F};
   deflate(distances, tau, 1, 2.0, caps);
   EXPECT_FLOAT_EQ(caps[0], 0.0F);
@@ -215,7 +217,7 @@ TEST(Deflation, ReachFollowsATailAndStopsAtAnEvenBackground) {
     for (std::size_t k = 0; k < background; ++k)
       distances.push_back(static_cast<float>(10.0 * static_cast<double>(k) / static_cast<double>(background)));
     const std::vector<float> ones(distances.size(), 1.0F);
-    return tail_reach(distances, ones, ones);
+    return tail_reach(distances, ones, 1.0F);
   };
   EXPECT_EQ(reach(0.4, 0), 1);
   EXPECT_EQ(reach(0.4, 20000), 1) << "an even background is no tail";

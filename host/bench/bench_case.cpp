@@ -22,7 +22,6 @@ namespace {
 
 constexpr int kSteps = 10;
 constexpr double kSyntheticSpread = 0.003;
-constexpr std::size_t kSampledFrom = 8192;
 constexpr double kThreshold = 0.01;  // of a plane by default, and three times the spread above
 
 /// Passes everything on and keeps a copy of each swarm it is asked about.
@@ -60,7 +59,7 @@ Expected<> fly(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& s
   swarm::Settings settings = swarm::resolve(options, working.finite_count(), kThreshold);
   settings.particles = static_cast<int>(particles);
   const swarm::Random random(seed);
-  const swarm::Subset subset(working, random, kSampledFrom);
+  const swarm::Subset subset(working, random, swarm::kSampledFrom);
   const swarm::Sampler sampler(working, subset.index(), space, random);
   swarm::Landscape landscape(evaluator, space, working.frame(), settings);
   swarm::Swarm swarm(space, settings, random);

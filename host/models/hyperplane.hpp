@@ -89,38 +89,22 @@ class Hyperplane : public ModelSpace {
   }
 
   bool refine(const WorkingPoints& points, const Weighted& support, Position& theta) const override {
-    Vector mean;
-    Eigen::Matrix<double, D, D> scatter;
-    if (!moments(points, support, mean, scatter)) return false;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> solver(scatter);
-    if (solver.info() != Eigen::Success) return false;
-    // The second smallest spread tells a plane from a line of points, a line from a single point.
-    if (!(solver.eigenvalues()[1] > 1e-12)) return false;
-    Vector normal = solver.eigenvectors().col(0);
-    if (normal.dot(theta.template head<D>()) < 0) normal = -normal;
-    theta.template head<D>() = normal;
-    theta[D] = -normal.dot(mean);
-    return admit(theta);
+    if (support.index.size() < static_cast<std::size_t>(D)) return false;
+    return refine(moments(points, support), theta);
   }
 
   Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(D + 1, D + 1);
-    Vector mean;
-    Eigen::Matrix<double, D, D> scatter;
-    if (!moments(points, support, mean, scatter)) return covariance;
-    double total = 0;
-    for (const double w : support.weight) total += w;
-    // Residual n.x + o. With n moving in its tangent space T, the Jacobian row is [x^T T, 1]; its information is the scatter about the
-    // mean for the direction and the total weight for the offset at the mean.
-    const Vector n = theta.template head<D>();
-    const Eigen::Matrix<double, D, D> project = Eigen::Matrix<double, D, D>::Identity() - n * n.transpose();
-    const Eigen::Matrix<double, D, D> information = project * scatter * project * total;
-    const Eigen::Matrix<double, D, D> direction = information.completeOrthogonalDecomposition().pseudoInverse();
-    covariance.topLeftCorner(D, D) = direction;
-    covariance.block(0, D, D, 1) = -direction * mean;
-    covariance.block(D, 0, 1, D) = covariance.block(0, D, D, 1).transpose();
-    covariance(D, D) = mean.dot(direction * mean) + 1.0 / total;
-    return covariance;
+    return covariance(moments(points, support), theta);
+  }
+
+  bool closed_form() const noexcept override { return true; }
+
+  bool refine_by_moments(const kernels::Moments& all, const Frame& frame, Position& theta) const override {
+    return refine(moments(all, frame), theta);
+  }
+
+  Eigen::MatrixXd covariance_by_moments(const kernels::Moments& all, const Frame& frame, const Position& theta) const override {
+    return covariance(moments(all, frame), theta);
   }
 
   Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
@@ -166,15 +150,62 @@ class Hyperplane : public ModelSpace {
   }
 
  private:
-  /// Weighted mean and scatter (divided by the total weight) about it.
-  static bool moments(const WorkingPoints& points, const Weighted& support, Vector& mean, Eigen::Matrix<double, D, D>& scatter) {
-    if (support.index.size() < static_cast<std::size_t>(D)) return false;
+  /// In the working frame; the scatter is about the mean and divided by the total weight.
+  struct Moments {
     double total = 0;
-    points.template accumulate<D>(support.index, support.weight, total, mean, scatter);
-    if (!(total > 0)) return false;
-    mean /= total;
-    scatter = scatter / total - mean * mean.transpose();
-    return true;
+    Vector mean = Vector::Zero();
+    Eigen::Matrix<double, D, D> scatter = Eigen::Matrix<double, D, D>::Zero();
+  };
+
+  static Moments moments(const WorkingPoints& points, const Weighted& support) {
+    Moments m;
+    points.template accumulate<D>(support.index, support.weight, m.total, m.mean, m.scatter);
+    if (!(m.total > 0)) return m;
+    m.mean /= m.total;
+    m.scatter = m.scatter / m.total - m.mean * m.mean.transpose();
+    return m;
+  }
+
+  static Moments moments(const kernels::Moments& all, const Frame& frame) {
+    Moments m;
+    m.total = all.weight;
+    if (!(m.total > 0)) return m;
+    for (std::size_t d = 0; d < D; ++d) {
+      m.mean[static_cast<int>(d)] = (all.mean[d] - frame.centre[d]) / frame.scale;
+      for (std::size_t e = 0; e < D; ++e) {
+        m.scatter(static_cast<int>(d), static_cast<int>(e)) = all.scatter[d][e] / (m.total * frame.scale * frame.scale);
+      }
+    }
+    return m;
+  }
+
+  bool refine(const Moments& m, Position& theta) const {
+    if (!(m.total > 0)) return false;
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> solver(m.scatter);
+    if (solver.info() != Eigen::Success) return false;
+    // The second smallest spread tells a plane from a line of points, a line from a single point.
+    if (!(solver.eigenvalues()[1] > 1e-12)) return false;
+    Vector normal = solver.eigenvectors().col(0);
+    if (normal.dot(theta.template head<D>()) < 0) normal = -normal;
+    theta.template head<D>() = normal;
+    theta[D] = -normal.dot(m.mean);
+    return admit(theta);
+  }
+
+  static Eigen::MatrixXd covariance(const Moments& m, const Position& theta) {
+    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(D + 1, D + 1);
+    if (!(m.total > 0)) return covariance;
+    // Residual n.x + o. With n moving in its tangent space T, the Jacobian row is [x^T T, 1]; its information is the scatter about the
+    // mean for the direction and the total weight for the offset at the mean.
+    const Vector n = theta.template head<D>();
+    const Eigen::Matrix<double, D, D> project = Eigen::Matrix<double, D, D>::Identity() - n * n.transpose();
+    const Eigen::Matrix<double, D, D> information = project * m.scatter * project * m.total;
+    const Eigen::Matrix<double, D, D> direction = information.completeOrthogonalDecomposition().pseudoInverse();
+    covariance.topLeftCorner(D, D) = direction;
+    covariance.block(0, D, D, 1) = -direction * m.mean;
+    covariance.block(D, 0, 1, D) = covariance.block(0, D, D, 1).transpose();
+    covariance(D, D) = m.mean.dot(direction * m.mean) + 1.0 / m.total;
+    return covariance;
   }
 
   Vector axis_ = Vector::Zero();

@@ -12,6 +12,7 @@
 #include <swarmfit/model.hpp>
 
 #include "host/models/working_points.hpp"
+#include "kernels/evidence.hpp"
 #include "kernels/models/models.hpp"
 
 namespace swarmfit::models {
@@ -50,6 +51,12 @@ class ModelSpace {
   virtual bool refine(const WorkingPoints& points, const Weighted& support, Position& theta) const = 0;
   /// Covariance of a least-squares position given unit residual variance, in the working frame.
   virtual Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+
+  /// Whether least squares needs to know no more of its points than their moments. Then the two below serve as well as the two above, and
+  /// nobody has to list the points.
+  virtual bool closed_form() const noexcept { return false; }
+  virtual bool refine_by_moments(const kernels::Moments&, const Frame&, Position&) const { return false; }
+  virtual Eigen::MatrixXd covariance_by_moments(const kernels::Moments&, const Frame&, const Position&) const { return {}; }
 
   /// Parameters in the data's frame and unit, as results and kernels take them, and back.
   virtual Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const = 0;

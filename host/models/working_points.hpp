@@ -11,6 +11,7 @@
 
 #include <swarmfit/points.hpp>
 
+#include "kernels/evidence.hpp"
 #include "kernels/points_view.hpp"
 
 namespace swarmfit::models {
@@ -25,19 +26,21 @@ struct Frame {
 
 kernels::PointsView to_kernel(const PointsView& points) noexcept;
 
-/// A cloud with its frame and the list of its finite points. Owns no coordinates.
+/// A cloud with its frame. Owns no coordinates.
 class WorkingPoints {
  public:
   WorkingPoints() = default;
-  /// Looks at every point once. The centre is the mean of the finite points, the scale their root mean square distance from it.
+  /// `survey` is that of the points. The centre is the mean of the finite points, the scale their root mean square distance from it.
+  WorkingPoints(const PointsView& points, kernels::Survey survey);
+  /// Looks at the points one after another.
   explicit WorkingPoints(const PointsView& points);
 
   int dimension() const noexcept { return view_.dimension; }
   std::size_t size() const noexcept { return view_.count; }
-  std::size_t finite_count() const noexcept { return finite_count_; }
-  bool finite(std::size_t i) const noexcept { return finite_.empty() || finite_[i] != 0; }
-  /// Input index of the k-th finite point.
-  std::uint32_t finite_index(std::size_t k) const noexcept { return index_.empty() ? static_cast<std::uint32_t>(k) : index_[k]; }
+  std::size_t finite_count() const noexcept { return survey_.finite_count; }
+  bool finite(std::size_t i) const noexcept { return ((survey_.finite[i / 64] >> (i % 64)) & 1U) != 0; }
+  /// Input indices of the finite points at these places, each in [0, finite_count), among them; places in ascending order.
+  std::vector<std::uint32_t> finite_at(std::span<const std::size_t> places) const;
   const Frame& frame() const noexcept { return frame_; }
   /// Dimension of the smallest flat that holds all finite points (to float precision): 0 a point, 1 a line, 2 a plane ...
   int rank() const noexcept { return rank_; }
@@ -85,16 +88,10 @@ class WorkingPoints {
     }
   }
 
-  template <class T>
-  void look_at();
-  void describe(const Eigen::Vector4d& origin, const Eigen::Vector4d& mean, const Eigen::Matrix4d& square);
-
   kernels::PointsView view_;
+  kernels::Survey survey_;
   Frame frame_;
-  std::size_t finite_count_ = 0;
   int rank_ = 0;
-  std::vector<std::uint8_t> finite_;  // empty: all are
-  std::vector<std::uint32_t> index_;  // empty: the identity
 };
 
 }  // namespace swarmfit::models

@@ -14,12 +14,12 @@ constexpr double kDeviations = 3;    // a fall that chance would not make
 
 }  // namespace
 
-int tail_reach(std::span<const float> distances, std::span<const float> caps, std::span<const float> tau) {
+int tail_reach(std::span<const float> distances, std::span<const float> caps, float tau) {
   std::array<double, kFurthest + 2> slab{};
   const auto furthest = static_cast<float>(slab.size());
   for (std::size_t i = 0; i < distances.size(); ++i) {
-    if (!(caps[i] >= 0.5F * tau[i]) || !(distances[i] < furthest * tau[i])) continue;  // NaN fails the second test
-    slab[static_cast<std::size_t>(distances[i] / tau[i])] += 1;
+    if (!(caps[i] >= 0.5F * tau) || !(distances[i] < furthest * tau)) continue;  // NaN fails the second test
+    slab[static_cast<std::size_t>(distances[i] / tau)] += 1;
   }
   // A tail falls from slab to slab until it meets the surroundings, which stay level.
   int reach = 1;
@@ -32,12 +32,12 @@ int tail_reach(std::span<const float> distances, std::span<const float> caps, st
   return reach;
 }
 
-void deflate(std::span<const float> distances, std::span<const float> tau, int reach, double slope, std::span<float> caps) {
+void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps) {
   const auto steep = static_cast<float>(slope);
   const auto width = static_cast<float>(reach);
   for (std::size_t i = 0; i < caps.size(); ++i) {
     if (std::isnan(distances[i])) continue;
-    caps[i] = std::min(caps[i], std::max(0.0F, steep * (distances[i] - width * tau[i])));
+    caps[i] = std::min(caps[i], std::max(0.0F, steep * (distances[i] - width * tau)));
   }
 }
 

@@ -10,6 +10,7 @@
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_scale.hpp"
 #include "host/swarm/settings.hpp"
+#include "host/swarm/settle.hpp"
 #include "kernels/evaluators.hpp"
 
 namespace swarmfit {
@@ -40,32 +41,24 @@ Expected<> check_points(const PointsView& points, const models::WorkingPoints& w
   return {};
 }
 
+Expected<models::WorkingPoints> survey(kernels::FitnessEvaluator& evaluator, const PointsView& points) {
+  kernels::Survey looked_at;
+  if (auto done = evaluator.survey(models::to_kernel(points), looked_at); !done) return tl::unexpected(swarm::to_error(done.error()));
+  return models::WorkingPoints(points, std::move(looked_at));
+}
+
 }  // namespace
 
 struct Fitter::State {
   FitOptions options;
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
-  std::unique_ptr<kernels::FitnessEvaluator> scout;  // made when a cloud is first large enough to need one
 
   kernels::EvaluatorOptions wanted() const {
     kernels::EvaluatorOptions w;
     w.threads = options.threads;
     w.pipeline_cache = options.pipeline_cache;
     return w;
-  }
-
-  /// The scout for a cloud of that many finite points, of the same back end and device; null where the search is on all points.
-  Expected<kernels::FitnessEvaluator*> scout_for(std::size_t finite_points) {
-    const std::size_t part = swarm::resolve(options, finite_points, 1.0).search_points;
-    if (part == 0 || finite_points <= part) return nullptr;
-    if (!scout) {
-      const kernels::Identity& who = evaluator->identity();
-      auto made = kernels::make_evaluator(who.backend == "vulkan" ? who.device : who.backend, wanted());
-      if (!made) return tl::unexpected(swarm::to_error(made.error()));
-      scout = std::move(made->evaluator);
-    }
-    return scout.get();
   }
 };
 
@@ -117,33 +110,50 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     return fail(Error::Kind::bad_input, fmt::format("points have {} columns, must have {} to fit a {}", points.dimension(),
                                                     dimension(options.model), name(options.model)));
   }
-  const models::WorkingPoints working(points);
-  if (auto ok = check_points(points, working, *space); !ok) return tl::unexpected(ok.error());
   kernels::FitnessEvaluator& evaluator = *state_->evaluator;
-  const std::size_t particles = static_cast<std::size_t>(options.particles.value_or(100));
-  if (const auto support = evaluator.supports({space->kind(), points.size(), particles}); !support) {
-    return fail(Error::Kind::backend_unavailable, support.reason);
-  }
-  if (auto done = evaluator.set_points(models::to_kernel(points)); !done) return tl::unexpected(swarm::to_error(done.error()));
+  auto whole = survey(evaluator, points);
+  if (!whole) return tl::unexpected(whole.error());
+  if (auto ok = check_points(points, *whole, *space); !ok) return tl::unexpected(ok.error());
+  swarm::Settings settings = swarm::resolve(options, whole->finite_count(), 1.0);
 
-  auto scout = state_->scout_for(working.finite_count());
-  if (!scout) return tl::unexpected(scout.error());
+  const swarm::Random random(options.seed);
+  std::optional<swarm::Rows> thin_rows;
+  models::WorkingPoints thin;
+  if (settings.stands_for > 1) {
+    thin_rows.emplace(whole->view(), swarm::draw_part(*whole, random, swarm::kThinnedPart, settings.fit_points));
+    auto looked_at = survey(evaluator, thin_rows->view());
+    if (!looked_at) return tl::unexpected(looked_at.error());
+    thin = std::move(*looked_at);
+  }
+  const models::WorkingPoints& working = thin_rows ? thin : *whole;
+  const bool searches_part = settings.searches_part(working.finite_count());
+  const swarm::Subset part(working, random, searches_part ? settings.search_points : swarm::kSampledFrom);
+  const kernels::Workload workload{space->kind(), searches_part ? part.index().size() : working.size(),
+                                   static_cast<std::size_t>(settings.particles)};
+  if (const auto support = evaluator.supports(workload); !support) return fail(Error::Kind::backend_unavailable, support.reason);
 
   FitResult result;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
   if (options.estimate_threshold || !given) {
-    auto estimated = swarm::estimate_threshold(evaluator, *scout, *space, working, options);
+    auto estimated = swarm::estimate_threshold(evaluator, *space, working, part, whole->finite_count(), options);
     if (!estimated) return tl::unexpected(estimated.error());
     result.threshold = *estimated;
   } else {
     result.threshold = *given;
   }
-  const swarm::Settings settings = swarm::resolve(options, working.finite_count(), result.threshold);
-  swarm::MultiModel search(evaluator, *scout, *space, working, settings, options.seed, limits);
+  settings = swarm::resolve(options, whole->finite_count(), result.threshold);
+  swarm::MultiModel search(evaluator, *space, working, part, settings, options.seed, limits);
   if (auto done = search.run(on_model, warm_start, result); !done) return tl::unexpected(done.error());
+  std::vector<models::Position> found = search.found();
+  const swarm::Ground ground{evaluator, *space, *whole, static_cast<float>(result.threshold)};
+  if (thin_rows) {
+    for (models::Position& theta : found) theta = space->from_data(space->to_data(theta, working.frame()), whole->frame());
+    if (auto done = swarm::refit(ground, found); !done) return tl::unexpected(done.error());
+  }
+  if (auto done = swarm::settle(ground, found, result); !done) return tl::unexpected(done.error());
   result.backend = backend();
   result.seed = options.seed;
-  result.finite_points = working.finite_count();
+  result.finite_points = whole->finite_count();
   result.total_ms = std::chrono::duration<double, std::milli>(swarm::Clock::now() - limits.start).count();
   return result;
 } catch (const std::bad_alloc&) {

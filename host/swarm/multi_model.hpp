@@ -29,43 +29,46 @@ struct Limits {
 
 class MultiModel {
  public:
-  /// `evaluator` holds the points. `scout`, of the same kind, is given a part of them to search on where the settings say so and the cloud
-  /// is larger; nullptr searches on all points.
-  MultiModel(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
-             const models::WorkingPoints& points, const Settings& settings, std::uint64_t seed, Limits limits);
+  /// `points`: the whole cloud, or a thinned one of the size that the settings were resolved for. `part` is what samples are drawn from, and
+  /// where the settings say so what swarms search. `evaluator` is given what is searched.
+  MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points, const Subset& part,
+             const Settings& settings, std::uint64_t seed, Limits limits);
 
-  /// Fills models, labels, stop_reason and the counts of the result.
+  /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle().
   Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result);
+  /// Positions of the result's models in the frame of the points.
+  const std::vector<models::Position>& found() const noexcept { return found_; }
 
  private:
   enum class Outcome { found, unpaid, complete, interrupted };
 
   Expected<Outcome> search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta, double& loss);
+  Expected<> refine(models::Position& theta, double& loss);
   Expected<bool> accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result);
-  Expected<> deflate(std::span<const float> distances);
+  Expected<> deflate();
   Expected<> finish(FitResult& result);
-  Expected<> polish(const Ground& ground);
-  Expected<> drop_unpaid(const Ground& ground, FitResult& result);
-  Expected<> label(FitResult& result);
-  Expected<> describe(FitResult& result);
+  Expected<> polish();
+  Expected<> drop_unpaid(FitResult& result);
   std::optional<std::string> interrupted() const;
-  Expected<> set_caps(std::span<const float> caps);
+  void restore_caps();
+  Expected<> show_caps();
   void count_effort(FitResult& result) const;
-  Expected<> distances(const models::Position& theta);
   double elapsed_ms() const;
-  int rounds() const noexcept;  ///< of refinement on all points
   double loss_of_nothing() const;
+  const Ground& searched() const noexcept { return part_searched_ ? part_ground_ : ground_; }
 
   kernels::FitnessEvaluator& evaluator_;
-  kernels::FitnessEvaluator* scout_;  // null where the search is on all points
   const models::ModelSpace& space_;
   const models::WorkingPoints& points_;
   const Settings& settings_;
   Random random_;
   Limits limits_;
-  Landscape landscape_, searched_;             // of all points, and of those that are searched on
-  Subset subset_;                              // what samples are drawn from, and the scout's points
-  std::vector<float> tau_, caps_, distances_;  // one a point; caps_ is what is left to explain, in both kinds of deflation
+  const Subset& part_;
+  const bool part_searched_;
+  Landscape landscape_;  // of the points that are searched
+  float tau_;
+  Ground ground_, part_ground_;                      // all points, and the part
+  std::vector<float> caps_, part_caps_, distances_;  // one a point; caps are what is left to explain, in both kinds of deflation
   std::vector<models::Position> found_;
   double scale_ = 0;  // loss of a model that explains nothing
   std::size_t steps_ = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host/swarm/multi_model.hpp"
+#include "host/swarm/settle.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -43,27 +44,28 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
   return sigma;
 }
 
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
-                                    const models::WorkingPoints& points, const FitOptions& options) {
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
+                                    const models::WorkingPoints& points, const Subset& part, std::size_t finite_points,
+                                    const FitOptions& options) {
   const double unit = points.frame().scale;
   double tau = kGenerous * unit;
   std::vector<float> distances(points.size());
   for (int round = 0; round < kRounds; ++round) {
-    const Settings settings = resolve(options, points.finite_count(), tau);
+    const Settings settings = resolve(options, finite_points, tau);
     Limits limits;
     limits.max_models = kModels;
-    MultiModel search(evaluator, scout, space, points, settings, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
+    MultiModel search(evaluator, space, points, part, settings, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
+    const Ground ground{evaluator, space, points, static_cast<float>(tau)};
+    if (auto done = settle(ground, search.found(), result); !done) return tl::unexpected(done.error());
     // Median over the models' points: each model votes with what it holds.
     std::vector<std::pair<double, std::size_t>> votes;
     std::size_t total = 0;
-    for (const Model& model : result.models) {
-      const kernels::ModelView view{space.kind(),
-                                    std::span<const double>(model.parameters.data(), static_cast<std::size_t>(model.parameters.size()))};
-      if (auto done = evaluator.distances(view, distances); !done) return tl::unexpected(to_error(done.error()));
-      votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), model.inliers);
-      total += model.inliers;
+    for (std::size_t m = 0; m < result.models.size(); ++m) {
+      if (auto done = weigh(ground, search.found()[m], {}, distances); !done) return tl::unexpected(done.error());
+      votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), result.models[m].inliers);
+      total += result.models[m].inliers;
     }
     if (votes.empty()) {  // so wide that nothing stands out from what surrounds it
       tau /= 2;

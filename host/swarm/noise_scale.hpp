@@ -4,6 +4,7 @@
 #include <swarmfit/fit.hpp>
 
 #include "host/models/model_space.hpp"
+#include "host/swarm/subset.hpp"
 #include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::swarm {
@@ -13,8 +14,10 @@ namespace swarmfit::swarm {
 double gaussian_part(std::span<const float> distances, double guess, double reach);
 
 /// tau = 2.5 sigma, sigma the noise of the most prominent models: a swarm finds one under a generous threshold, the spread of its
-/// inliers gives the next threshold, until that stays. Fails with bad_input where the data show no scale.
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, kernels::FitnessEvaluator* scout, const models::ModelSpace& space,
-                                    const models::WorkingPoints& points, const FitOptions& options);
+/// inliers gives the next threshold, until that stays. `points` stand for a whole cloud of `finite_points`; `part` of them as MultiModel
+/// takes it. Fails with bad_input where the data show no scale.
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
+                                    const models::WorkingPoints& points, const Subset& part, std::size_t finite_points,
+                                    const FitOptions& options);
 
 }  // namespace swarmfit::swarm

@@ -5,14 +5,14 @@
 
 namespace swarmfit::swarm {
 
-Support count_support(std::span<const float> distances, std::span<const float> caps, std::span<const float> tau) {
+Support count_support(std::span<const float> distances, std::span<const float> caps, float tau) {
   Support s;
   for (std::size_t i = 0; i < distances.size(); ++i) {
-    if (!(caps[i] >= 0.5F * tau[i]) || std::isnan(distances[i])) continue;
+    if (!(caps[i] >= 0.5F * tau) || std::isnan(distances[i])) continue;
     ++s.unexplained;
-    if (distances[i] <= tau[i]) {
+    if (distances[i] <= tau) {
       ++s.inliers;
-    } else if (distances[i] <= 3 * tau[i]) {
+    } else if (distances[i] <= 3 * tau) {
       ++s.band;
     }
   }
@@ -33,7 +33,9 @@ double log_false_alarms(const Support& support, int minimal_sample) {
 
 bool pays(const Support& support, const Settings& settings, int minimal_sample) {
   constexpr double kLogFalseAlarms = -4.605170185988091;  // log 0.01: one invented model in a hundred clouds of noise
-  return support.inliers >= settings.min_inliers && log_false_alarms(support, minimal_sample) < kLogFalseAlarms;
+  if (support.inliers < settings.min_inliers) return false;
+  const auto whole = [&](std::size_t n) { return static_cast<std::size_t>(static_cast<double>(n) * settings.stands_for); };
+  return log_false_alarms({whole(support.inliers), whole(support.band), whole(support.unexplained)}, minimal_sample) < kLogFalseAlarms;
 }
 
 }  // namespace swarmfit::swarm

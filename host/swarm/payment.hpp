@@ -15,8 +15,8 @@ struct Support {
   std::size_t unexplained = 0;  ///< all unexplained points
 };
 
-/// A point is unexplained while its cap is at least half of its tau. NaN distances count for nothing.
-Support count_support(std::span<const float> distances, std::span<const float> caps, std::span<const float> tau);
+/// A point is unexplained while its cap is at least half of tau. NaN distances count for nothing.
+Support count_support(std::span<const float> distances, std::span<const float> caps, float tau);
 
 /// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
 /// binomial tail, background density from the band, one test for each minimal sample of the points). Lower is more meaningful.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace swarmfit::swarm {
 namespace {
@@ -10,84 +9,100 @@ namespace {
 constexpr float kCorner = 0.1F;       // of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
 
-Expected<> measure(const Ground& ground, const models::Position& theta, std::vector<float>& distances) {
-  const Eigen::VectorXd data = ground.space.to_data(theta, ground.points.frame());
-  distances.resize(ground.tau.size());
-  const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
-  if (auto done = ground.evaluator.distances(model, distances); !done) return tl::unexpected(to_error(done.error()));
-  return {};
-}
+/// Does the refinement need to know each point's distance, beside what a pass tells?
+bool needs_distances(const Ground& ground, Loss loss) { return !ground.space.closed_form() || loss != Loss::truncated_l1; }
 
-/// Weights that turn least squares into least absolute deviations, which is what the truncated L1 loss asks of the points within tau.
-void weights(const Ground& ground, std::span<const std::uint32_t> index, std::span<const float> distances, std::vector<double>& weight) {
-  weight.resize(index.size());
-  for (std::size_t k = 0; k < index.size(); ++k) {
-    const float d = distances[index[k]], tau = ground.tau[index[k]];
-    weight[k] = 1.0 / static_cast<double>(std::max(d / tau, kCorner));
+double loss_of(const kernels::Evidence& evidence, Loss loss, std::span<const float> caps, std::span<const float> distances) {
+  if (loss == Loss::truncated_l1) return evidence.cost;
+  double sum = 0;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    if (std::isnan(distances[i])) continue;
+    const auto least = static_cast<double>(std::min(distances[i], caps[i]));
+    sum += least * least;
   }
+  return sum;
 }
 
 /// Sum over points of the distance to the nearest model, at most tau.
 Expected<double> joint_energy(const Ground& ground, const std::vector<models::Position>& models) {
-  std::vector<float> distances;
-  std::vector<float> least(ground.tau.begin(), ground.tau.end());
+  std::vector<float> distances(ground.size()), least(ground.size(), ground.tau);
   for (const models::Position& model : models) {
-    if (auto done = measure(ground, model, distances); !done) return tl::unexpected(done.error());
+    if (auto done = weigh(ground, model, {}, distances); !done) return tl::unexpected(done.error());
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (distances[i] < least[i]) least[i] = distances[i];
     }
   }
   double energy = 0;
-  for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(i) ? static_cast<double>(least[i]) : 0.0;
+  for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(ground.index(i)) ? static_cast<double>(least[i]) : 0.0;
   return energy;
 }
 
 }  // namespace
 
-Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<const float> caps, models::Position& theta, double& loss,
-                      int rounds) {
-  std::vector<float> distances;
+Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
+                                  std::span<float> distances) {
+  const Eigen::VectorXd data = ground.space.to_data(theta, ground.points.frame());
+  const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
+  kernels::Evidence evidence;
+  const auto done =
+      ground.evaluator.weigh(ground.view(), {ground.tau, kCorner, caps}, std::span(&model, 1), distances, std::span(&evidence, 1));
+  if (!done) return tl::unexpected(to_error(done.error()));
+  return evidence;
+}
+
+Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
+  std::vector<kernels::Evidence> evidence(models.size());
+  if (auto done = ground.evaluator.weigh(ground.view(), {ground.tau, kCorner, {}}, models, {}, evidence); !done) {
+    return tl::unexpected(to_error(done.error()));
+  }
+  return evidence;
+}
+
+bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<const float> caps, std::span<const float> distances,
+            models::Position& theta) {
+  if (evidence.count < static_cast<std::uint64_t>(ground.space.minimal_sample())) return false;
+  if (ground.space.closed_form()) return ground.space.refine_by_moments(evidence.moments, ground.points.frame(), theta);
   std::vector<std::uint32_t> index;
   std::vector<double> weight;
-  for (int round = 0; round < rounds; ++round) {
-    if (auto done = measure(ground, theta, distances); !done) return done;
-    index.clear();
-    for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] <= ground.tau[i] && distances[i] <= caps[i]) index.push_back(static_cast<std::uint32_t>(i));
-    }
-    weights(ground, index, distances, weight);
-    if (!ground.index.empty()) {
-      for (std::uint32_t& i : index) i = ground.index[i];
-    }
-    models::Position candidate = theta;
-    if (!ground.space.refine(ground.points, {index, weight}, candidate)) return {};
-    auto cost = landscape.loss(candidate);
-    if (!cost) return tl::unexpected(cost.error());
-    if (!(*cost < loss)) return {};
-    const bool worthwhile = loss - *cost > kWorthwhile * loss;
-    theta = candidate;
-    loss = *cost;
-    if (!worthwhile) return {};
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const float d = distances[i];
+    if (!(d <= ground.tau) || (!caps.empty() && d > caps[i])) continue;
+    index.push_back(ground.index(i));
+    weight.push_back(1.0 / static_cast<double>(std::max(d / ground.tau, kCorner)));
   }
-  return {};
+  return ground.space.refine(ground.points, {index, weight}, theta);
+}
+
+Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds) {
+  std::vector<float> distances(needs_distances(ground, loss) ? ground.size() : 0);
+  auto evidence = weigh(ground, theta, caps, distances);
+  if (!evidence) return tl::unexpected(evidence.error());
+  double best = loss_of(*evidence, loss, caps, distances);
+  for (int round = 0; round < rounds; ++round) {
+    models::Position candidate = theta;
+    if (!refine(ground, *evidence, caps, distances, candidate)) break;
+    evidence = weigh(ground, candidate, caps, distances);
+    if (!evidence) return tl::unexpected(evidence.error());
+    const double now = loss_of(*evidence, loss, caps, distances);
+    if (!(now < best)) break;
+    const bool worthwhile = best - now > kWorthwhile * best;
+    theta = candidate;
+    best = now;
+    if (!worthwhile) break;
+  }
+  return best;
 }
 
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models, int rounds) {
-  std::vector<float> distances;
-  std::vector<std::uint32_t> index;
-  std::vector<double> weight;
+  std::vector<float> distances(needs_distances(ground, Loss::truncated_l1) ? ground.size() : 0);
   auto energy = joint_energy(ground, models);
   if (!energy) return energy;
   for (int round = 0; round < rounds; ++round) {
     std::vector<models::Position> candidates = models;
     for (std::size_t m = 0; m < models.size(); ++m) {
-      if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
-      index.clear();
-      for (std::size_t i = 0; i < distances.size(); ++i) {
-        if (distances[i] <= ground.tau[i]) index.push_back(static_cast<std::uint32_t>(i));
-      }
-      weights(ground, index, distances, weight);
-      if (!ground.space.refine(ground.points, {index, weight}, candidates[m])) candidates[m] = models[m];
+      auto evidence = weigh(ground, models[m], {}, distances);
+      if (!evidence) return tl::unexpected(evidence.error());
+      if (!refine(ground, *evidence, {}, distances, candidates[m])) candidates[m] = models[m];
     }
     auto candidate_energy = joint_energy(ground, candidates);
     if (!candidate_energy) return candidate_energy;
@@ -102,12 +117,12 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Positi
 
 Expected<std::vector<std::size_t>> unique_support(const Ground& ground, const std::vector<models::Position>& models) {
   constexpr std::uint16_t kSeveral = 65535;
-  std::vector<std::uint16_t> owner(ground.tau.size(), 0);
-  std::vector<float> distances;
+  std::vector<std::uint16_t> owner(ground.size(), 0);
+  std::vector<float> distances(ground.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
-    if (auto done = measure(ground, models[m], distances); !done) return tl::unexpected(done.error());
+    if (auto done = weigh(ground, models[m], {}, distances); !done) return tl::unexpected(done.error());
     for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] <= ground.tau[i]) owner[i] = owner[i] == 0 ? static_cast<std::uint16_t>(m + 1) : kSeveral;
+      if (distances[i] <= ground.tau) owner[i] = owner[i] == 0 ? static_cast<std::uint16_t>(m + 1) : kSeveral;
     }
   }
   std::vector<std::size_t> unique(models.size(), 0);

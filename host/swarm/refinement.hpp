@@ -6,27 +6,43 @@
 
 #include "host/models/model_space.hpp"
 #include "host/swarm/landscape.hpp"
+#include "host/swarm/subset.hpp"
 #include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::swarm {
 
-/// What refinement works on.
+/// What refinement works on: all of `points`, or a part of them.
 struct Ground {
   kernels::FitnessEvaluator& evaluator;
   const models::ModelSpace& space;
   const models::WorkingPoints& points;
-  std::span<const float> tau;            ///< one a point of the evaluator [data unit]
-  std::span<const std::uint32_t> index;  ///< input index of each point of the evaluator; empty: it holds the whole cloud
+  float tau;  ///< [data unit]
+  const Subset* part = nullptr;
+
+  std::size_t size() const noexcept { return part != nullptr ? part->index().size() : points.size(); }
+  kernels::PointsView view() const noexcept { return part != nullptr ? part->view() : points.view(); }
+  /// Input index of the k-th point.
+  std::uint32_t index(std::size_t k) const noexcept { return part != nullptr ? part->index()[k] : static_cast<std::uint32_t>(k); }
 };
 
-/// Least absolute deviations, by reweighting, on the points within tau that are not better explained already (distance below their cap),
-/// repeated while the truncated loss falls, `rounds` times at most. `loss` is that of theta on entry and on return; it never rises.
-Expected<> refine_one(const Ground& ground, Landscape& landscape, std::span<const float> caps, models::Position& theta, double& loss,
-                      int rounds = 8);
+/// What the ground's points within tau of a model and, where there are caps, within their cap say of it, weighted so that least squares
+/// becomes least absolute deviations, which is what the truncated L1 loss asks of them. `distances` is empty or one a point.
+Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
+                                  std::span<float> distances);
 
-/// Energy of all models together: sum over points of min(tau_i, distance to the nearest model) [data unit].
-/// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy. The evaluator must hold
-/// the whole cloud.
+/// The same of each of several models, all points within tau.
+Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models);
+
+/// The least-squares model of those points; false if they do not determine one. `distances` are those to theta.
+bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<const float> caps, std::span<const float> distances,
+            models::Position& theta);
+
+/// Least absolute deviations, by reweighting, on the points that are not better explained already (distance below their cap), repeated
+/// while the truncated loss falls, `rounds` times at most. Returns the loss of theta; it never rises.
+Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = 8);
+
+/// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
+/// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models, int rounds = 8);
 
 /// For each model, the points within tau of it and of no other: what would be lost without it.

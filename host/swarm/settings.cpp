@@ -67,6 +67,7 @@ Settings preset(Preset preset) {
   s.local_share = 0.5;
   s.still = 1e-3;
   s.search_points = 8192;
+  s.fit_points = 32768;
   return s;
 }
 
@@ -81,10 +82,13 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
   s.threshold = threshold;
+  const std::size_t fitted = s.fit_points > 0 ? std::min(s.fit_points, finite_points) : finite_points;
+  s.stands_for = fitted > 0 ? static_cast<double>(finite_points) / static_cast<double>(fitted) : 1.0;
   // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.
-  const std::size_t share = finite_points / 100;
+  const std::size_t share = fitted / 100;
   const auto least = static_cast<std::size_t>(2 * models::make_space(options.model, {})->minimal_sample() + 1);
-  s.min_inliers = options.min_inliers > 0 ? options.min_inliers : std::max(share, least);
+  const auto wanted = static_cast<std::size_t>(std::ceil(static_cast<double>(options.min_inliers) / s.stands_for));
+  s.min_inliers = options.min_inliers > 0 ? wanted : std::max(share, least);
   return s;
 }
 

@@ -27,6 +27,8 @@ struct Settings {
   double renewal_share = 0;       ///< of the particles that start anew from a sample at each step, in [0, 1]
   double still = 0;               ///< a global best that gains less than this share of the saving has not moved
   std::size_t search_points = 0;  ///< a larger cloud is searched on this many of its points; 0: on all
+  std::size_t fit_points = 0;     ///< a larger cloud is thinned to this many points until the models are known; 0: never
+  double stands_for = 1;          ///< points of the whole cloud for each that is fitted to
   Deflation deflation = Deflation::residual;
   double lambda = 10;          ///< Eq. (5)
   double dead_zone_slope = 2;  ///< kappa of residual deflation: how fast caps rise beyond the dead zone
@@ -36,9 +38,15 @@ struct Settings {
   bool joint = true;            ///< refine all models together at the end
   double threshold = 0.01;      ///< tau [data unit]
   std::size_t min_inliers = 0;  ///< resolved, >= 1
+
+  /// Do swarms search a part of so many points?
+  bool searches_part(std::size_t finite_points) const noexcept { return search_points > 0 && finite_points > search_points; }
 };
 
-/// `finite_points`: of the cloud that is fitted; `threshold` in the data's unit.
+/// Points that minimal samples are drawn from where swarms search all of a large cloud: enough to tell surfaces apart.
+inline constexpr std::size_t kSampledFrom = 8192;
+
+/// `finite_points`: of the whole cloud; `threshold` in the data's unit. `min_inliers` counts points of the thinned cloud where it is thinned.
 Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold);
 
 }  // namespace swarmfit::swarm

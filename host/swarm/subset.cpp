@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
+#include <numeric>
 #include <utility>
 
 namespace swarmfit::swarm {
@@ -24,33 +26,43 @@ std::uint64_t morton(const models::WorkingPoints& points, std::size_t i) {
   return code;
 }
 
+std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part) {
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> coded;
+  coded.reserve(part.size());
+  for (const std::uint32_t i : part) coded.emplace_back(morton(points, i), i);
+  std::sort(coded.begin(), coded.end());
+  std::vector<std::uint32_t> index(coded.size());
+  std::transform(coded.begin(), coded.end(), index.begin(), [](const auto& one) { return one.second; });
+  return index;
+}
+
 }  // namespace
 
-Subset::Subset(const models::WorkingPoints& points, const Random& random, std::size_t size) : dimension_(points.dimension()) {
+std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size) {
   const std::size_t n = points.finite_count();
-  const std::size_t kept = std::min(n, size);
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> coded(kept);
-  for (std::size_t k = 0; k < kept; ++k) {
-    std::size_t at = k;
-    if (kept < n) {
-      const std::size_t from = n * k / kept, to = n * (k + 1) / kept;
-      at = from + Random::below(random.words(Draw::subset, 0, 0, static_cast<std::uint32_t>(k))[0], to - from);
-    }
-    const std::uint32_t i = points.finite_index(at);
-    coded[k] = {morton(points, i), i};
+  std::vector<std::size_t> places(std::min(n, size));
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  for (std::size_t k = 0; k < places.size() && places.size() < n; ++k) {
+    const std::size_t from = n * k / places.size(), to = n * (k + 1) / places.size();
+    places[k] = from + Random::below(random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k))[0], to - from);
   }
-  std::sort(coded.begin(), coded.end());
-  index_.reserve(kept);
-  rows_.reserve(kept * static_cast<std::size_t>(dimension_));
-  for (const auto& [code, i] : coded) {
-    index_.push_back(i);
-    for (int d = 0; d < dimension_; ++d) rows_.push_back(points.view().at(i, d));
+  return points.finite_at(places);
+}
+
+Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index)
+    : scalar_(points.scalar == kernels::Scalar::float32 ? PointsView::Scalar::float32 : PointsView::Scalar::float64),
+      dimension_(points.dimension),
+      width_(static_cast<std::size_t>(points.dimension) * (points.scalar == kernels::Scalar::float32 ? sizeof(float) : sizeof(double))),
+      bytes_(index.size() * width_) {
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    std::memcpy(bytes_.data() + k * width_, static_cast<const std::byte*>(points.data) + index[k] * points.stride, width_);
   }
 }
 
-kernels::PointsView Subset::view() const noexcept {
-  return {rows_.data(), kernels::Scalar::float64, dimension_, index_.size(), sizeof(double) * static_cast<std::size_t>(dimension_)};
-}
+PointsView Rows::view() const noexcept { return {bytes_.data(), scalar_, dimension_, bytes_.size() / width_, width_}; }
+
+Subset::Subset(const models::WorkingPoints& points, const Random& random, std::size_t size)
+    : index_(in_morton_order(points, draw_part(points, random, kSearchedPart, size))), rows_(points.view(), index_) {}
 
 void Subset::gather(std::span<const float> all, std::vector<float>& values) const {
   values.resize(index_.size());

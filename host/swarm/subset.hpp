@@ -1,6 +1,7 @@
-// A part of the cloud that stands for the whole while a swarm looks around.
+// Parts of the cloud that stand for the whole.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -10,23 +11,42 @@
 
 namespace swarmfit::swarm {
 
-/// At most `size` finite points, spread evenly over the input's order (one drawn from each of equal runs, so that a scan or an image is
-/// covered evenly) and kept in Morton order, in which neighbours are neighbours in space. The whole cloud where it is no larger.
+/// Input indices of at most `size` finite points, in input order: one drawn from each of equal runs, so that a scan or an image is covered
+/// evenly. All finite points where there are no more. Parts of different
+/// `number` are drawn independently.
+inline constexpr std::uint32_t kSearchedPart = 0, kThinnedPart = 1;
+std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size);
+
+/// Rows of a cloud, copied as they are: a cloud of its own.
+class Rows {
+ public:
+  Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index);
+
+  /// A view of memory that lives as long as this.
+  PointsView view() const noexcept;
+
+ private:
+  PointsView::Scalar scalar_;
+  int dimension_;
+  std::size_t width_;  // bytes of a row
+  std::vector<std::byte> bytes_;
+};
+
+/// What a swarm searches on while it looks around: a part of the cloud in Morton order, in which neighbours are neighbours in space.
 class Subset {
  public:
   Subset(const models::WorkingPoints& points, const Random& random, std::size_t size);
 
   /// Input indices, in Morton order.
   std::span<const std::uint32_t> index() const noexcept { return index_; }
-  /// The coordinates of these points, row after row; a view of memory that lives as long as this.
-  kernels::PointsView view() const noexcept;
+  /// The coordinates of these points; a view of memory that lives as long as this.
+  kernels::PointsView view() const noexcept { return models::to_kernel(rows_.view()); }
   /// values[k] = all[index[k]].
   void gather(std::span<const float> all, std::vector<float>& values) const;
 
  private:
-  int dimension_;
   std::vector<std::uint32_t> index_;
-  std::vector<double> rows_;
+  Rows rows_;
 };
 
 }  // namespace swarmfit::swarm

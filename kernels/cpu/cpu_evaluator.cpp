@@ -16,6 +16,7 @@
 
 #include "kernels/checks.hpp"
 #include "kernels/cpu/cpu_kernels.hpp"
+#include "kernels/cpu/point_passes.hpp"
 #include "kernels/cpu/point_store.hpp"
 #include "kernels/cpu/swarm_costs.hpp"
 #include "kernels/evaluators.hpp"
@@ -56,7 +57,7 @@ Result<> guarded(std::size_t points, Work&& work) {
 class CpuEvaluator final : public FitnessEvaluator {
  public:
   CpuEvaluator(const CpuKernels& kernels, int threads, bool pruning)
-      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning) {}
+      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning), passes_(kernels) {}
 
   const Identity& identity() const noexcept override { return identity_; }
   Support supports(const Workload& workload) const override {
@@ -134,6 +135,23 @@ class CpuEvaluator final : public FitnessEvaluator {
 
   Effort effort() const noexcept override { return effort_; }
 
+  Result<> survey(const PointsView& points, Survey& survey) override {
+    if (auto ok = check_points(points); !ok) return ok;
+    return guarded(points.count, [&] { arena_.execute([&] { passes_.survey(points, survey); }); });
+  }
+
+  Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
+                 std::span<Evidence> evidence) override {
+    if (auto ok = check_weigh(points, how, models, distances, evidence); !ok) return ok;
+    return guarded(points.count, [&] { arena_.execute([&] { passes_.weigh(points, how, models, distances, evidence); }); });
+  }
+
+  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
+                 std::span<Evidence> evidence) override {
+    if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
+    return guarded(points.count, [&] { arena_.execute([&] { passes_.claim(points, tolerance, models, labels, evidence); }); });
+  }
+
  private:
   /// Coefficients in the frame of the stored points; false if one is not finite.
   bool centre(const ModelView& model, float* k) const {
@@ -182,10 +200,37 @@ class CpuEvaluator final : public FitnessEvaluator {
   std::vector<float> coefficients_;
   std::vector<char> finite_;  ///< a model: whether its coefficients are finite
   SwarmCosts costs_;
+  PointPasses passes_;
   Effort effort_;
 };
 
+/// What a back end that leaves them to the processor makes of the passes over the caller's points.
+template <class Pass>
+Result<> pass_on_cpu(std::size_t points, Pass&& pass) {
+  return guarded(points, [&] {
+    PointPasses passes(*available_kernels().front());
+    pass(passes);
+  });
+}
+
 }  // namespace
+
+Result<> FitnessEvaluator::survey(const PointsView& points, Survey& survey) {
+  if (auto ok = check_points(points); !ok) return ok;
+  return pass_on_cpu(points.count, [&](PointPasses& passes) { passes.survey(points, survey); });
+}
+
+Result<> FitnessEvaluator::weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models,
+                                 std::span<float> distances, std::span<Evidence> evidence) {
+  if (auto ok = check_weigh(points, how, models, distances, evidence); !ok) return ok;
+  return pass_on_cpu(points.count, [&](PointPasses& passes) { passes.weigh(points, how, models, distances, evidence); });
+}
+
+Result<> FitnessEvaluator::claim(const PointsView& points, float tolerance, std::span<const ModelView> models,
+                                 std::span<std::uint16_t> labels, std::span<Evidence> evidence) {
+  if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
+  return pass_on_cpu(points.count, [&](PointPasses& passes) { passes.claim(points, tolerance, models, labels, evidence); });
+}
 
 Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOptions& options) {
   if (options.threads < 0 || options.threads > kMaxThreads) {

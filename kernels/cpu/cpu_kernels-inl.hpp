@@ -7,7 +7,9 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include <hwy/highway.h>
 
@@ -334,6 +336,8 @@ void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coeff
   });
 }
 
+#include "kernels/cpu/point_passes.inl"
+
 /// As many chains as hide the latency of two multiply-adds a cycle and still fit the registers.
 double spin_fma(std::size_t rounds, float* sink) {
   const FloatTag d;
@@ -359,8 +363,20 @@ double spin_fma(std::size_t rounds, float* sink) {
 }
 
 const CpuKernels& kernel_table() {
-  static const CpuKernels table{
-      hwy::TargetName(HWY_TARGET), lanes(), add_costs, add_open_costs, cap_units, bound, distances, keep_nearest, spin_fma};
+  static const CpuKernels table{hwy::TargetName(HWY_TARGET),
+                                lanes(),
+                                add_costs,
+                                add_open_costs,
+                                cap_units,
+                                bound,
+                                distances,
+                                keep_nearest,
+                                split,
+                                sum_all,
+                                weigh,
+                                claim,
+                                sum_labelled,
+                                spin_fma};
   return table;
 }
 

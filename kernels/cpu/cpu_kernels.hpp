@@ -1,6 +1,7 @@
 // The inner loops of the CPU back end, one table of functions for each instruction set the build knows (cpu_kernels.cpp).
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -66,6 +67,24 @@ struct Open {
   std::uint8_t mixed = 0;
 };
 
+/// Points that a pass over the caller's memory takes at a time.
+inline constexpr std::size_t kStripPoints = 512;
+
+/// A strip of rows in columns, about a pivot among them. `limit` is what a distance may be; less than 0 for rows that are not finite,
+/// whose columns are 0, and for those that fill the strip up to a whole number of the widest vectors.
+struct Strip {
+  alignas(64) std::array<std::array<float, kStripPoints>, kMaxDimension> columns;
+  alignas(64) std::array<float, kStripPoints> limit;
+  std::size_t count = 0;  ///< rows of the caller
+};
+
+/// Sums over a strip, about its pivot.
+struct StripSums {
+  double count = 0, weight = 0, square = 0, cost = 0;
+  std::array<double, kMaxDimension> first{};                              ///< sum of w x
+  std::array<std::array<double, kMaxDimension>, kMaxDimension> second{};  ///< sum of w x x^T, the upper triangle
+};
+
 struct CpuKernels {
   const char* name;
   std::size_t lanes;
@@ -92,6 +111,26 @@ struct CpuKernels {
   /// Where distances[i] < nearest[i] and <= tolerance[i]: nearest[i] = distances[i], labels[i] = label.
   void (*keep_nearest)(const float* distances, const float* tolerance, std::size_t count, std::uint16_t label, float* nearest,
                        std::uint16_t* labels);
+
+  /// Fills a strip from `count` tight rows of `dimension` columns, less the pivot, with `limit` for each that is finite; `finite` gets a bit
+  /// for each, in whole words of the strip.
+  void (*split)(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, Strip& strip,
+                std::uint64_t* finite);
+
+  /// Of all finite points, each with weight 1; in double, so that the moments tell a plane from a line.
+  void (*sum_all)(const Strip& strip, std::size_t dimension, StripSums& sums);
+
+  /// Of the points within the tolerance and their limit; see Weighing. `distances` may be null.
+  void (*weigh)(ModelKind kind, const Strip& strip, const float* coefficients, float tolerance, float corner, StripSums& sums,
+                float* distances);
+
+  /// Where the distance is less than nearest[i]: nearest[i] is that, labels[i] = label. Adds to the cost; true if there was any such point.
+  bool (*claim)(ModelKind kind, const Strip& strip, const float* coefficients, std::int32_t label, float* nearest, std::int32_t* labels,
+                double& cost);
+
+  /// Of the points with this label, each with weight 1.
+  void (*sum_labelled)(const Strip& strip, std::size_t dimension, std::int32_t label, const float* nearest, const std::int32_t* labels,
+                       StripSums& sums);
 
   /// Runs `rounds` rounds of independent multiply-adds that stay in registers; returns how many scalar ones that were.
   double (*spin_fma)(std::size_t rounds, float* sink);

@@ -31,6 +31,12 @@ struct ModelTraits {
   bool affine = false;        ///< the residual is n . x + offset with coefficients n, offset: boxes bound it
 };
 
+/// One model among several, perhaps of several kinds.
+struct ModelView {
+  ModelKind kind = ModelKind::plane;
+  std::span<const double> parameters;  ///< in the data's own frame and unit
+};
+
 const ModelTraits& traits(ModelKind kind) noexcept;
 std::optional<ModelKind> model_kind(std::string_view name) noexcept;
 

@@ -97,6 +97,26 @@ class ReferenceEvaluator final : public FitnessEvaluator {
 
   Effort effort() const noexcept override { return effort_; }
 
+  Result<> survey(const PointsView& points, Survey& survey) override {
+    if (auto ok = check_points(points); !ok) return ok;
+    survey_points(points, survey);
+    return {};
+  }
+
+  Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
+                 std::span<Evidence> evidence) override {
+    if (auto ok = check_weigh(points, how, models, distances, evidence); !ok) return ok;
+    weigh_points(points, how, models, distances, evidence);
+    return {};
+  }
+
+  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
+                 std::span<Evidence> evidence) override {
+    if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
+    claim_points(points, tolerance, models, labels, evidence);
+    return {};
+  }
+
  private:
   double* row(std::size_t i) { return centred_.data() + i * static_cast<std::size_t>(dimension_); }
 

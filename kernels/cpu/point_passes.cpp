@@ -1,0 +1,226 @@
+#include "kernels/cpu/point_passes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include <oneapi/tbb/parallel_for.h>
+
+namespace swarmfit::kernels::cpu {
+namespace {
+
+constexpr std::size_t kRunStrips = 8;
+constexpr std::size_t kRunPoints = kRunStrips * kStripPoints;
+
+std::size_t run_count(const PointsView& points) { return (points.count + kRunPoints - 1) / kRunPoints; }
+
+using Pivot = std::array<double, kMaxDimension>;
+
+/// A place among the strip's points: the median, a column, of a few of them, so that a stray does not cost the others their precision.
+Pivot choose_pivot(const PointsView& points, std::size_t first, std::size_t count) {
+  constexpr std::size_t kAsked = 5;
+  std::array<std::array<double, kAsked>, kMaxDimension> values{};
+  std::size_t found = 0;
+  const auto ask = [&](std::size_t row) {
+    if (!points.finite(row)) return;
+    for (int d = 0; d < points.dimension; ++d) values[static_cast<std::size_t>(d)][found] = points.at(row, d);
+    ++found;
+  };
+  for (std::size_t k = 0; k < kAsked; ++k) ask(first + k * (count - 1) / kAsked);
+  for (std::size_t i = 0; found == 0 && i < count; ++i) ask(first + i);
+  Pivot pivot{};
+  for (std::size_t d = 0; found > 0 && d < kMaxDimension; ++d) {
+    const auto middle = values[d].begin() + static_cast<std::ptrdiff_t>(found / 2);
+    std::nth_element(values[d].begin(), middle, values[d].begin() + static_cast<std::ptrdiff_t>(found));
+    pivot[d] = *middle;
+  }
+  return pivot;
+}
+
+/// What a task needs to work on one strip after another.
+struct Bench {
+  Strip strip;
+  Pivot pivot;
+  std::array<std::uint64_t, kStripPoints / 64> finite;
+  std::array<float, kStripPoints * kMaxDimension> rows;
+  std::size_t first = 0, count = 0;
+  std::vector<std::size_t> claimants;  ///< models that some point was given to
+
+  /// Strip number `index` of the points, with `limit` for the finite ones.
+  void load(const CpuKernels& kernels, const PointsView& points, std::size_t index, float limit) {
+    first = index * kStripPoints;
+    count = std::min(kStripPoints, points.count - first);
+    pivot = choose_pivot(points, first, count);
+    const auto width = static_cast<std::size_t>(points.dimension);
+    const char* from = static_cast<const char*>(points.data) + first * points.stride;
+    std::array<float, kMaxDimension> origin{};
+    if (points.scalar == Scalar::float32) {
+      for (std::size_t d = 0; d < width; ++d) origin[d] = static_cast<float>(pivot[d]);
+      const bool tight = points.stride == width * sizeof(float) && reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0;
+      if (tight) return kernels.split(reinterpret_cast<const float*>(from), width, count, origin.data(), limit, strip, finite.data());
+      for (std::size_t i = 0; i < count; ++i, from += points.stride) std::memcpy(rows.data() + i * width, from, width * sizeof(float));
+    } else {
+      for (std::size_t i = 0; i < count; ++i, from += points.stride) {
+        std::array<double, kMaxDimension> row;
+        std::memcpy(row.data(), from, width * sizeof(double));
+        for (std::size_t d = 0; d < width; ++d) rows[i * width + d] = narrow(row[d] - pivot[d]);
+      }
+    }
+    kernels.split(rows.data(), width, count, origin.data(), limit, strip, finite.data());
+  }
+
+  /// The sums' moments in the points' frame.
+  Moments moments(const StripSums& sums) const {
+    Moments m;
+    m.weight = sums.weight;
+    if (!(sums.weight > 0)) return m;
+    for (std::size_t a = 0; a < kMaxDimension; ++a) m.mean[a] = sums.first[a] / sums.weight;
+    for (std::size_t a = 0; a < kMaxDimension; ++a) {
+      for (std::size_t b = a; b < kMaxDimension; ++b) {
+        m.scatter[a][b] = m.scatter[b][a] = sums.second[a][b] - sums.weight * m.mean[a] * m.mean[b];
+      }
+    }
+    for (std::size_t a = 0; a < kMaxDimension; ++a) m.mean[a] += pivot[a];
+    return m;
+  }
+
+  /// A model's coefficients about the pivot; false if one is not finite.
+  bool centre(const ModelView& model, float* coefficients) const {
+    constexpr double kMost = 1e30;  // what float cannot hold is farther away than any point either way
+    std::array<double, kMaxParameters> wide{};
+    if (!centred_coefficients(model.kind, model.parameters.data(), pivot.data(), wide.data())) return false;
+    for (std::size_t c = 0; c < wide.size(); ++c) coefficients[c] = static_cast<float>(std::clamp(wide[c], -kMost, kMost));
+    return true;
+  }
+
+  /// For a model that cannot be evaluated: every distance is infinite. Returns its cost.
+  double be_nowhere(std::array<float, kStripPoints>& distances) const {
+    double cost = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool there = strip.limit[i] >= 0;
+      distances[i] = there ? std::numeric_limits<float>::infinity() : std::numeric_limits<float>::quiet_NaN();
+      cost += there ? static_cast<double>(strip.limit[i]) : 0.0;
+    }
+    return cost;
+  }
+
+  void add(const StripSums& sums, Evidence& evidence) const {
+    evidence.count += static_cast<std::uint64_t>(sums.count);
+    evidence.square += sums.square;
+    evidence.cost += sums.cost;
+    evidence.moments.add(moments(sums));
+  }
+
+ private:
+  /// To float; finite stays finite.
+  static float narrow(double v) {
+    constexpr double kMost = std::numeric_limits<float>::max();
+    return static_cast<float>(std::isfinite(v) ? std::clamp(v, -kMost, kMost) : v);
+  }
+};
+
+/// body(bench, run, strip) for each strip, a task for each run of them.
+template <class Body>
+void for_strips(const PointsView& points, Body&& body) {
+  const std::size_t strips = (points.count + kStripPoints - 1) / kStripPoints;
+  tbb::parallel_for(std::size_t{0}, run_count(points), [&](std::size_t run) {
+    Bench bench;
+    for (std::size_t strip = run * kRunStrips; strip < std::min(strips, (run + 1) * kRunStrips); ++strip) body(bench, run, strip);
+  });
+}
+
+}  // namespace
+
+void PointPasses::survey(const PointsView& points, Survey& survey) {
+  constexpr std::size_t kWords = kStripPoints / 64;
+  survey.finite.resize((points.count + 63) / 64);
+  evidence_.assign(run_count(points), {});
+  for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
+    bench.load(kernels_, points, strip, 0);
+    StripSums sums;
+    kernels_.sum_all(bench.strip, static_cast<std::size_t>(points.dimension), sums);
+    bench.add(sums, evidence_[run]);
+    std::copy_n(bench.finite.begin(), (bench.count + 63) / 64, survey.finite.begin() + static_cast<std::ptrdiff_t>(strip * kWords));
+  });
+  std::array<Evidence, 1> all;
+  add_up(evidence_.size(), all);
+  survey.finite_count = all[0].count;
+  survey.moments = all[0].moments;
+}
+
+void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
+                        std::span<Evidence> evidence) {
+  const std::size_t runs = run_count(points);
+  evidence_.assign(runs * models.size(), {});
+  for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
+    bench.load(kernels_, points, strip, how.tolerance);
+    for (std::size_t i = 0; !how.caps.empty() && i < bench.count; ++i) {
+      if (bench.strip.limit[i] >= 0) bench.strip.limit[i] = how.caps[bench.first + i];
+    }
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      std::array<float, kMaxParameters> coefficients{};
+      alignas(64) std::array<float, kStripPoints> told;
+      StripSums sums;
+      if (bench.centre(models[m], coefficients.data())) {
+        kernels_.weigh(models[m].kind, bench.strip, coefficients.data(), how.tolerance, how.corner, sums,
+                       distances.empty() ? nullptr : told.data());
+      } else {
+        sums.cost = bench.be_nowhere(told);
+      }
+      bench.add(sums, evidence_[run * models.size() + m]);
+      if (!distances.empty()) std::copy_n(told.begin(), bench.count, distances.begin() + static_cast<std::ptrdiff_t>(bench.first));
+    }
+  });
+  add_up(runs, evidence);
+}
+
+void PointPasses::claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
+                        std::span<Evidence> evidence) {
+  const std::size_t runs = run_count(points);
+  const float beyond = std::nextafter(tolerance, std::numeric_limits<float>::infinity());
+  evidence_.assign(runs * models.size(), {});
+  for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
+    bench.load(kernels_, points, strip, tolerance);
+    alignas(64) std::array<float, kStripPoints> nearest, told;
+    alignas(64) std::array<std::int32_t, kStripPoints> label;
+    label.fill(0);
+    bench.claimants.clear();
+    for (std::size_t i = 0; i < kStripPoints; ++i) nearest[i] = bench.strip.limit[i] >= 0 ? beyond : -1.0F;
+    const auto width = static_cast<std::size_t>(points.dimension);
+    Evidence* const of_run = evidence_.data() + run * models.size();
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      std::array<float, kMaxParameters> coefficients{};
+      if (!bench.centre(models[m], coefficients.data())) {
+        of_run[m].cost += bench.be_nowhere(told);
+        continue;
+      }
+      const bool any = kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1), nearest.data(),
+                                      label.data(), of_run[m].cost);
+      if (any) bench.claimants.push_back(m);
+    }
+    for (std::size_t i = 0; i < bench.count; ++i) labels[bench.first + i] = static_cast<std::uint16_t>(label[i]);
+    for (const std::size_t m : bench.claimants) {
+      StripSums sums;
+      kernels_.sum_labelled(bench.strip, width, static_cast<std::int32_t>(m + 1), nearest.data(), label.data(), sums);
+      bench.add(sums, of_run[m]);
+    }
+  });
+  add_up(runs, evidence);
+}
+
+void PointPasses::add_up(std::size_t runs, std::span<Evidence> evidence) const {
+  std::fill(evidence.begin(), evidence.end(), Evidence{});
+  for (std::size_t run = 0; run < runs; ++run) {
+    for (std::size_t m = 0; m < evidence.size(); ++m) {
+      const Evidence& part = evidence_[run * evidence.size() + m];
+      evidence[m].count += part.count;
+      evidence[m].square += part.square;
+      evidence[m].cost += part.cost;
+      evidence[m].moments.add(part.moments);
+    }
+  }
+}
+
+}  // namespace swarmfit::kernels::cpu

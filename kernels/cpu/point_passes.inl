@@ -1,0 +1,224 @@
+// Inner loops of the passes over the caller's points, strip by strip. Included by cpu_kernels-inl.hpp only, inside its namespace.
+
+/// Sums held in registers: of weights, of weighted coordinates and of their products.
+template <std::size_t D>
+struct VectorSums {
+  Vector count, weight, square, first[D], second[D][D];
+
+  HWY_INLINE VectorSums() {
+    count = weight = square = hn::Zero(FloatTag());
+    for (std::size_t a = 0; a < D; ++a) {
+      first[a] = hn::Zero(FloatTag());
+      for (std::size_t b = a; b < D; ++b) second[a][b] = hn::Zero(FloatTag());
+    }
+  }
+  /// `w` is 0 where a point does not speak.
+  HWY_INLINE void add(const Vector* x, Vector w) {
+    weight = hn::Add(weight, w);
+    for (std::size_t a = 0; a < D; ++a) {
+      const Vector wx = hn::Mul(w, x[a]);
+      first[a] = hn::Add(first[a], wx);
+      for (std::size_t b = a; b < D; ++b) second[a][b] = hn::MulAdd(wx, x[b], second[a][b]);
+    }
+  }
+  HWY_INLINE void finish(StripSums& sums) const {
+    const auto total = [](Vector v) HWY_ATTR { return static_cast<double>(hn::GetLane(hn::SumOfLanes(FloatTag(), v))); };
+    sums.count = total(count);
+    sums.weight = total(weight);
+    sums.square = total(square);
+    for (std::size_t a = 0; a < D; ++a) {
+      sums.first[a] = total(first[a]);
+      for (std::size_t b = a; b < D; ++b) sums.second[a][b] = total(second[a][b]);
+    }
+  }
+};
+
+template <std::size_t D>
+HWY_INLINE void load_rows(const float* HWY_RESTRICT rows, Vector* x) {
+  const FloatTag d;
+  if constexpr (D == 2) hn::LoadInterleaved2(d, rows, x[0], x[1]);
+  if constexpr (D == 3) hn::LoadInterleaved3(d, rows, x[0], x[1], x[2]);
+  if constexpr (D == 4) hn::LoadInterleaved4(d, rows, x[0], x[1], x[2], x[3]);
+}
+
+template <std::size_t D>
+HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, const float* HWY_RESTRICT pivot, float limit, Strip& strip,
+                         std::uint64_t* HWY_RESTRICT finite) {
+  constexpr float kFar = 1e18F;  // its square is still a float
+  const FloatTag d;
+  const Vector zero = hn::Zero(d);
+  std::fill(finite, finite + kStripPoints / 64, std::uint64_t{0});
+  const auto put = [&](std::size_t i, const float* from) HWY_ATTR {
+    Vector x[D];
+    load_rows<D>(from, x);
+    Vector probe = hn::Mul(x[0], zero);  // stays 0 unless a column is NaN or infinite
+    for (std::size_t c = 1; c < D; ++c) probe = hn::MulAdd(x[c], zero, probe);
+    const auto usable = hn::Eq(probe, zero);
+    for (std::size_t c = 0; c < D; ++c) {
+      const Vector centred = hn::Clamp(hn::Sub(x[c], hn::Set(d, pivot[c])), hn::Set(d, -kFar), hn::Set(d, kFar));
+      hn::Store(hn::IfThenElseZero(usable, centred), d, strip.columns[c].data() + i);
+    }
+    hn::Store(hn::IfThenElse(usable, hn::Set(d, limit), hn::Set(d, -1.0F)), d, strip.limit.data() + i);
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, usable, bits);
+    finite[i / 64] |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << (i % 64);
+  };
+  const std::size_t whole = count - count % lanes();
+  for (std::size_t i = 0; i < whole; i += lanes()) put(i, rows + i * D);
+  HWY_ALIGN float last[D * lanes()];
+  for (std::size_t i = whole; i % kMaxLanes != 0 || i < count; i += lanes()) {
+    std::fill(last, last + D * lanes(), std::numeric_limits<float>::quiet_NaN());
+    if (i < count) std::copy(rows + i * D, rows + count * D, last);
+    put(i, last);
+  }
+  strip.count = count;
+}
+
+/// body.template operator()<D>() for the dimension.
+template <class Body>
+HWY_INLINE void with_dimension(std::size_t dimension, Body&& body) {
+  if (dimension == 2) return body.template operator()<2>();
+  if (dimension == 3) return body.template operator()<3>();
+  body.template operator()<4>();
+}
+
+void split(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, Strip& strip,
+           std::uint64_t* finite) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { split_of<D>(rows, count, pivot, limit, strip, finite); });
+}
+
+template <std::size_t D>
+HWY_INLINE void load_columns(const Strip& strip, std::size_t i, Vector* x) {
+  for (std::size_t c = 0; c < D; ++c) x[c] = hn::Load(FloatTag(), strip.columns[c].data() + i);
+}
+
+template <std::size_t D>
+HWY_INLINE void sum_all_of(const Strip& strip, StripSums& sums) {
+  // Columns of points that are not finite are 0 and add nothing.
+  constexpr std::size_t kStrands = 8;
+  double count = 0;
+  std::array<std::array<double, kStrands>, D> first{};
+  std::array<std::array<std::array<double, kStrands>, D>, D> second{};
+  for (std::size_t i = 0; i < strip.count; i += kStrands) {
+    double x[D][kStrands];
+    for (std::size_t c = 0; c < D; ++c) {
+      for (std::size_t s = 0; s < kStrands; ++s) x[c][s] = static_cast<double>(strip.columns[c][i + s]);
+    }
+    for (std::size_t a = 0; a < D; ++a) {
+      for (std::size_t s = 0; s < kStrands; ++s) first[a][s] += x[a][s];
+      for (std::size_t b = a; b < D; ++b) {
+        for (std::size_t s = 0; s < kStrands; ++s) second[a][b][s] += x[a][s] * x[b][s];
+      }
+    }
+  }
+  for (std::size_t i = 0; i < strip.count; ++i) count += strip.limit[i] >= 0 ? 1.0 : 0.0;
+  const auto total = [](const std::array<double, kStrands>& strands) {
+    double sum = 0;
+    for (const double s : strands) sum += s;
+    return sum;
+  };
+  sums.count = sums.weight = count;
+  for (std::size_t a = 0; a < D; ++a) {
+    sums.first[a] = total(first[a]);
+    for (std::size_t b = a; b < D; ++b) sums.second[a][b] = total(second[a][b]);
+  }
+}
+
+void sum_all(const Strip& strip, std::size_t dimension, StripSums& sums) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { sum_all_of<D>(strip, sums); });
+}
+
+template <class Model>
+HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficients, float tolerance, float corner, StripSums& sums,
+                         float* HWY_RESTRICT distances) {
+  constexpr std::size_t D = Model::traits.dimension;
+  const FloatTag d;
+  const Vector widest = hn::Set(d, tolerance), most = hn::Set(d, 1 / corner), zero = hn::Zero(d), one = hn::Set(d, 1.0F);
+  Vector k[Model::traits.coefficient_count];
+  for (int c = 0; c < Model::traits.coefficient_count; ++c) k[c] = hn::Set(d, coefficients[c]);
+  VectorSums<D> all;
+  Vector cost = zero;
+  for (std::size_t i = 0; i < strip.count; i += lanes()) {
+    Vector x[D];
+    load_columns<D>(strip, i, x);
+    const Vector limit = hn::Load(d, strip.limit.data() + i);
+    const Vector distance = hn::Abs(Model::residual(VectorMath(), x, k));
+    cost = hn::Add(cost, hn::Max(least(distance, limit), zero));
+    const auto speaks = hn::And(hn::Le(distance, widest), hn::Le(distance, limit));
+    all.count = hn::Add(all.count, hn::IfThenElseZero(speaks, one));
+    all.square = hn::Add(all.square, hn::IfThenElseZero(speaks, hn::Mul(distance, distance)));
+    // A distance of 0 divides to infinity, and the corner is less.
+    all.add(x, hn::IfThenElseZero(speaks, hn::Min(hn::Div(widest, distance), most)));
+    if (distances != nullptr) {
+      const Vector told = hn::IfThenElse(hn::Ge(limit, zero), distance, hn::Set(d, std::numeric_limits<float>::quiet_NaN()));
+      hn::StoreU(told, d, distances + i);
+    }
+  }
+  all.finish(sums);
+  sums.cost = static_cast<double>(hn::GetLane(hn::SumOfLanes(d, cost)));
+}
+
+void weigh(ModelKind kind, const Strip& strip, const float* coefficients, float tolerance, float corner, StripSums& sums,
+           float* distances) {
+  visit_model(kind, [&]<class Model>() HWY_ATTR { weigh_of<Model>(strip, coefficients, tolerance, corner, sums, distances); });
+}
+
+template <class Model>
+HWY_INLINE bool claim_of(const Strip& strip, const float* HWY_RESTRICT coefficients, std::int32_t label, float* HWY_RESTRICT nearest,
+                         std::int32_t* HWY_RESTRICT labels, double& cost) {
+  constexpr std::size_t D = Model::traits.dimension;
+  const FloatTag d;
+  const BitsTag bits;
+  const Vector zero = hn::Zero(d);
+  const auto mine = hn::Set(bits, label);
+  Vector k[Model::traits.coefficient_count];
+  for (int c = 0; c < Model::traits.coefficient_count; ++c) k[c] = hn::Set(d, coefficients[c]);
+  Vector sum = zero;
+  auto any = hn::Zero(bits);
+  for (std::size_t i = 0; i < strip.count; i += lanes()) {
+    Vector x[D];
+    load_columns<D>(strip, i, x);
+    const Vector distance = hn::Abs(Model::residual(VectorMath(), x, k));
+    sum = hn::Add(sum, hn::Max(least(distance, hn::Load(d, strip.limit.data() + i)), zero));
+    const Vector before = hn::Load(d, nearest + i);
+    const auto closer = hn::Lt(distance, before);
+    hn::Store(hn::IfThenElse(closer, distance, before), d, nearest + i);
+    const auto won = hn::RebindMask(bits, closer);
+    hn::Store(hn::IfThenElse(won, mine, hn::Load(bits, labels + i)), bits, labels + i);
+    any = hn::Or(any, hn::VecFromMask(bits, won));
+  }
+  cost += static_cast<double>(hn::GetLane(hn::SumOfLanes(d, sum)));
+  return !hn::AllTrue(bits, hn::Eq(any, hn::Zero(bits)));
+}
+
+bool claim(ModelKind kind, const Strip& strip, const float* coefficients, std::int32_t label, float* nearest, std::int32_t* labels,
+           double& cost) {
+  return visit_model(kind, [&]<class Model>() HWY_ATTR { return claim_of<Model>(strip, coefficients, label, nearest, labels, cost); });
+}
+
+template <std::size_t D>
+HWY_INLINE void sum_labelled_of(const Strip& strip, std::int32_t label, const float* HWY_RESTRICT nearest,
+                                const std::int32_t* HWY_RESTRICT labels, StripSums& sums) {
+  const FloatTag d;
+  const BitsTag bits;
+  const auto mine = hn::Set(bits, label);
+  const Vector one = hn::Set(d, 1.0F);
+  VectorSums<D> all;
+  for (std::size_t i = 0; i < strip.count; i += lanes()) {
+    const auto speaks = hn::RebindMask(d, hn::Eq(hn::Load(bits, labels + i), mine));
+    if (hn::AllFalse(d, speaks)) continue;
+    Vector x[D];
+    load_columns<D>(strip, i, x);
+    const Vector w = hn::IfThenElseZero(speaks, one);
+    const Vector distance = hn::IfThenElseZero(speaks, hn::Load(d, nearest + i));
+    all.square = hn::MulAdd(distance, distance, all.square);
+    all.add(x, w);
+  }
+  all.count = all.weight;
+  all.finish(sums);
+}
+
+void sum_labelled(const Strip& strip, std::size_t dimension, std::int32_t label, const float* nearest, const std::int32_t* labels,
+                  StripSums& sums) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { sum_labelled_of<D>(strip, label, nearest, labels, sums); });
+}
