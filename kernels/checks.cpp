@@ -90,8 +90,7 @@ Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<co
     if (auto ok = check_model(model, points.dimension); !ok) return ok;
   }
   if (!distances.empty()) {
-    if (auto size = check_size("models.size()", models.size(), 1); !size) return size;
-    if (auto size = check_size("distances.size()", distances.size(), points.count); !size) return size;
+    if (auto size = check_size("distances.size()", distances.size(), models.size() * points.count); !size) return size;
   }
   return check_size("evidence.size()", evidence.size(), models.size());
 }

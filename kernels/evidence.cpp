@@ -102,7 +102,7 @@ void weigh_points(const PointsView& points, const Weighing& how, std::span<const
     for (std::size_t i = 0; i < points.count; ++i) {
       const bool finite = points.finite(i);
       const double d = finite ? residual[m](points, i) : std::numeric_limits<double>::quiet_NaN();
-      if (!distances.empty()) distances[i] = static_cast<float>(d);
+      if (!distances.empty()) distances[m * points.count + i] = static_cast<float>(d);
       if (!finite) continue;
       const double limit = how.caps.empty() ? tolerance : static_cast<double>(how.caps[i]);
       evidence[m].cost += std::min(d, limit);

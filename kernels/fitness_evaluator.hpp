@@ -100,8 +100,8 @@ class FitnessEvaluator {
   /// Which points are finite, and their moments.
   virtual Result<> survey(const PointsView& points, Survey& survey);
 
-  /// What the points within the tolerance of each model say of it, and if `distances` is not empty the |dist| of every point to the one
-  /// model there then is; NaN for points that are not finite. A model with a non-finite parameter has no point.
+  /// What the points within the tolerance of each model say of it. `distances` is empty, or gets |dist| of every point to the first model,
+  /// then to the second, and so on; NaN for points that are not finite. A model with a non-finite parameter has no point.
   virtual Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                          std::span<Evidence> evidence);
 

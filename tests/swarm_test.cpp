@@ -217,20 +217,40 @@ TEST(Deflation, ReachFollowsATailAndStopsAtAnEvenBackground) {
     for (std::size_t k = 0; k < background; ++k)
       distances.push_back(static_cast<float>(10.0 * static_cast<double>(k) / static_cast<double>(background)));
     const std::vector<float> ones(distances.size(), 1.0F);
-    return tail_reach(distances, ones, 1.0F);
+    return tail_reach(count_support(distances, ones, 1.0F));
   };
   EXPECT_EQ(reach(0.4, 0), 1);
   EXPECT_EQ(reach(0.4, 20000), 1) << "an even background is no tail";
   EXPECT_GE(reach(1.5, 0), 3);
 }
 
+Support support(std::size_t inliers, std::size_t band, std::size_t unexplained) {
+  Support s;
+  s.unexplained = unexplained;
+  s.slabs[0] = inliers;
+  s.slabs[1] = band / 2;
+  s.slabs[2] = band - band / 2;
+  return s;
+}
+
+TEST(Payment, CountsUnexplainedPointsBySlabs) {
+  const std::vector<float> distances{0.05F, 0.0F, 0.15F, 0.25F, 0.65F, 0.75F, 9.0F, std::nanf(""), 0.01F};
+  const std::vector<float> caps{0.1F, 0.05F, 0.1F, 0.1F, 0.1F, 0.1F, 0.1F, 0.1F, 0.049F};
+  const Support s = count_support(distances, caps, 0.1F);
+  EXPECT_EQ(s.unexplained, 7U);
+  EXPECT_EQ(s.inliers(), 2U) << "a point whose cap has sunk below half is explained";
+  EXPECT_EQ(s.band(), 2U);
+  EXPECT_EQ(s.slabs[6], 1U);
+  EXPECT_NEAR(s.square, 0.0025, 1e-6);
+}
+
 TEST(Payment, AModelOfTheBackgroundsDensityDoesNotPay) {
   Settings settings;
   settings.min_inliers = 10;
-  EXPECT_FALSE(pays({50, 100, 1000}, settings, 2)) << "as dense as what surrounds it";
-  EXPECT_TRUE(pays({150, 100, 1000}, settings, 2));
-  EXPECT_FALSE(pays({9, 0, 1000}, settings, 2)) << "fewer than min_inliers";
-  EXPECT_LT(log_false_alarms({150, 100, 1000}, 2), log_false_alarms({120, 100, 1000}, 2));
+  EXPECT_FALSE(pays(support(50, 100, 1000), settings, 2)) << "as dense as what surrounds it";
+  EXPECT_TRUE(pays(support(150, 100, 1000), settings, 2));
+  EXPECT_FALSE(pays(support(9, 0, 1000), settings, 2)) << "fewer than min_inliers";
+  EXPECT_LT(log_false_alarms(support(150, 100, 1000), 2), log_false_alarms(support(120, 100, 1000), 2));
 }
 
 TEST(NoiseScale, GaussianPartAmongUniformBackground) {

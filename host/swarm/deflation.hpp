@@ -3,11 +3,13 @@
 
 #include <span>
 
+#include "host/swarm/payment.hpp"
+
 namespace swarmfit::swarm {
 
 /// How far from a model its own points lie, in units of tau, >= 1. Counted over unexplained points in slabs of tau: where a sensor's noise
 /// exceeds tau the slabs next to the model hold its tail, which would be found again as splinters parallel to it.
-int tail_reach(std::span<const float> distances, std::span<const float> caps, float tau);
+int tail_reach(const Support& support);
 
 /// c_i <- min(c_i, max(0, slope (|dist_i| - reach tau))): nothing is left of points within reach, all of those well beyond it.
 /// NaN distances change nothing.

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
 constexpr int kMostRounds = 8;    // of refinement
-constexpr int kFullRounds = 2;    // of refinement on all points, where it was done on a part of them before
+constexpr int kFullRounds = 1;    // of refinement on all points, where it was done on a part of them before
 
 }  // namespace
 
@@ -128,22 +128,22 @@ Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<
   steps_ = static_cast<std::size_t>(swarm.steps());
   theta = swarm.best();
   if (auto done = refine(theta, loss); !done) return tl::unexpected(done.error());
-  if (pays(count_support(distances_, caps_, tau_), settings_, space_.minimal_sample())) return Outcome::found;
+  support_ = count_support(distances_, caps_, tau_);
+  if (pays(support_, settings_, space_.minimal_sample())) return Outcome::found;
   const auto& list = swarm.global_bests();
   const bool stable = list.front().fitness - list.back().fitness < kStable * scale_;
   return settings_.deflation == Deflation::parametric && stable ? Outcome::complete : Outcome::unpaid;
 }
 
+int MultiModel::full_rounds() const noexcept { return part_searched_ ? kFullRounds : kMostRounds; }
+
 Expected<> MultiModel::refine(models::Position& theta, double& loss) {
-  int rounds = settings_.refine ? kMostRounds : 0;
   if (part_searched_ && settings_.refine) {
-    if (auto done = refine_one(part_ground_, settings_.loss, part_caps_, theta); !done) return tl::unexpected(done.error());
-    rounds = kFullRounds;
+    if (auto done = refine_one(part_ground_, settings_.loss, part_caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
   }
-  auto least = refine_one(ground_, settings_.loss, caps_, theta, rounds);
+  auto least = refine_one(ground_, settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0, &distances_);
   if (!least) return tl::unexpected(least.error());
   loss = *least;
-  if (auto done = weigh(ground_, theta, caps_, distances_); !done) return tl::unexpected(done.error());
   return {};
 }
 
@@ -158,16 +158,9 @@ Expected<bool> MultiModel::accept(const models::Position& theta, double loss, co
   model.evaluations = result.evaluations - evaluations_before;
   model.points_touched = result.points_touched;
   model.found_at_ms = elapsed_ms();
-  std::size_t inliers = 0;
-  double square = 0;
-  for (std::size_t i = 0; i < distances_.size(); ++i) {
-    if (distances_[i] <= tau_ && caps_[i] >= 0.5F * tau_) {
-      ++inliers;
-      square += static_cast<double>(distances_[i]) * distances_[i];
-    }
-  }
-  model.inliers = static_cast<std::size_t>(std::lround(static_cast<double>(inliers) * settings_.stands_for));
-  model.rms = inliers > 0 ? std::sqrt(square / static_cast<double>(inliers)) : 0.0;
+  const auto inliers = static_cast<double>(support_.inliers());
+  model.inliers = static_cast<std::size_t>(std::lround(inliers * settings_.stands_for));
+  model.rms = inliers > 0 ? std::sqrt(support_.square / inliers) : 0.0;
   found_.push_back(theta);
   result.models.push_back(model);
   result.iterations += steps_;
@@ -177,7 +170,7 @@ Expected<bool> MultiModel::accept(const models::Position& theta, double loss, co
 }
 
 Expected<> MultiModel::deflate() {
-  swarm::deflate(distances_, tau_, tail_reach(distances_, caps_, tau_), settings_.dead_zone_slope, caps_);
+  swarm::deflate(distances_, tau_, tail_reach(support_), settings_.dead_zone_slope, caps_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   return show_caps();
 }
@@ -200,9 +193,7 @@ Expected<> MultiModel::polish() {
   // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs.
   restore_caps();
   for (models::Position& theta : found_) {
-    if (auto done = refine_one(ground_, settings_.loss, caps_, theta, part_searched_ ? kFullRounds : kMostRounds); !done) {
-      return tl::unexpected(done.error());
-    }
+    if (auto done = refine_one(ground_, settings_.loss, caps_, theta, full_rounds()); !done) return tl::unexpected(done.error());
   }
   return {};
 }
@@ -215,8 +206,7 @@ Expected<> MultiModel::drop_unpaid(FitResult& result) {
     if (2 * *least >= settings_.min_inliers) return {};
     found_.erase(found_.begin() + (least - unique->begin()));
     result.models.erase(result.models.begin() + (least - unique->begin()));
-    if (auto energy = refine_jointly(ground_, found_, part_searched_ ? kFullRounds : kMostRounds); !energy)
-      return tl::unexpected(energy.error());
+    if (auto energy = refine_jointly(ground_, found_, full_rounds()); !energy) return tl::unexpected(energy.error());
   }
   return {};
 }

@@ -10,6 +10,7 @@
 
 #include "host/models/model_space.hpp"
 #include "host/swarm/landscape.hpp"
+#include "host/swarm/payment.hpp"
 #include "host/swarm/random.hpp"
 #include "host/swarm/refinement.hpp"
 #include "host/swarm/settings.hpp"
@@ -55,6 +56,7 @@ class MultiModel {
   void count_effort(FitResult& result) const;
   double elapsed_ms() const;
   double loss_of_nothing() const;
+  int full_rounds() const noexcept;  ///< of refinement on all points
   const Ground& searched() const noexcept { return part_searched_ ? part_ground_ : ground_; }
 
   kernels::FitnessEvaluator& evaluator_;
@@ -69,6 +71,7 @@ class MultiModel {
   float tau_;
   Ground ground_, part_ground_;                      // all points, and the part
   std::vector<float> caps_, part_caps_, distances_;  // one a point; caps are what is left to explain, in both kinds of deflation
+  Support support_;                                  // of the last candidate
   std::vector<models::Position> found_;
   double scale_ = 0;  // loss of a model that explains nothing
   std::size_t steps_ = 0;

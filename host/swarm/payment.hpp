@@ -1,6 +1,7 @@
 // Whether a model pays for itself: enough points of its own, and more of them than chance would put there.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 
@@ -10,9 +11,14 @@ namespace swarmfit::swarm {
 
 /// What a candidate explains of what nobody has explained yet.
 struct Support {
-  std::size_t inliers = 0;      ///< unexplained points within tau
-  std::size_t band = 0;         ///< unexplained points between tau and 3 tau: what surrounds the model
-  std::size_t unexplained = 0;  ///< all unexplained points
+  static constexpr std::size_t kSlabs = 7;
+  std::size_t unexplained = 0;              ///< all unexplained points
+  std::array<std::size_t, kSlabs> slabs{};  ///< those less than tau away, those from there to 2 tau, and so on
+  double square = 0;                        ///< sum of the squared distances of the first slab [data unit^2]
+
+  std::size_t inliers() const noexcept { return slabs[0]; }
+  /// What surrounds the model.
+  std::size_t band() const noexcept { return slabs[1] + slabs[2]; }
 };
 
 /// A point is unexplained while its cap is at least half of tau. NaN distances count for nothing.

@@ -73,21 +73,26 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
   return ground.space.refine(ground.points, {index, weight}, theta);
 }
 
-Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds) {
-  std::vector<float> distances(needs_distances(ground, loss) ? ground.size() : 0);
-  auto evidence = weigh(ground, theta, caps, distances);
+Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds,
+                            std::vector<float>* distances) {
+  const bool listed = distances != nullptr || needs_distances(ground, loss);
+  std::vector<float> own, tried(listed && rounds > 0 ? ground.size() : 0);
+  std::vector<float>& kept = distances != nullptr ? *distances : own;
+  kept.resize(listed ? ground.size() : 0);
+  auto evidence = weigh(ground, theta, caps, kept);
   if (!evidence) return tl::unexpected(evidence.error());
-  double best = loss_of(*evidence, loss, caps, distances);
+  double best = loss_of(*evidence, loss, caps, kept);
   for (int round = 0; round < rounds; ++round) {
     models::Position candidate = theta;
-    if (!refine(ground, *evidence, caps, distances, candidate)) break;
-    evidence = weigh(ground, candidate, caps, distances);
+    if (!refine(ground, *evidence, caps, kept, candidate)) break;
+    evidence = weigh(ground, candidate, caps, tried);
     if (!evidence) return tl::unexpected(evidence.error());
-    const double now = loss_of(*evidence, loss, caps, distances);
+    const double now = loss_of(*evidence, loss, caps, tried);
     if (!(now < best)) break;
     const bool worthwhile = best - now > kWorthwhile * best;
     theta = candidate;
     best = now;
+    kept.swap(tried);
     if (!worthwhile) break;
   }
   return best;
@@ -121,8 +126,10 @@ Expected<std::vector<std::size_t>> unique_support(const Ground& ground, const st
   std::vector<float> distances(ground.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     if (auto done = weigh(ground, models[m], {}, distances); !done) return tl::unexpected(done.error());
+    const auto mine = static_cast<std::uint16_t>(m + 1);
     for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] <= ground.tau) owner[i] = owner[i] == 0 ? static_cast<std::uint16_t>(m + 1) : kSeveral;
+      const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;
+      owner[i] = distances[i] <= ground.tau ? taken : owner[i];
     }
   }
   std::vector<std::size_t> unique(models.size(), 0);

@@ -38,8 +38,10 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
             models::Position& theta);
 
 /// Least absolute deviations, by reweighting, on the points that are not better explained already (distance below their cap), repeated
-/// while the truncated loss falls, `rounds` times at most. Returns the loss of theta; it never rises.
-Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = 8);
+/// while the truncated loss falls, `rounds` times at most. Returns the loss of theta; it never rises. `distances`, where not null, gets those
+/// to the outcome.
+Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = 8,
+                            std::vector<float>* distances = nullptr);
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
 /// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.

@@ -112,10 +112,10 @@ struct CpuKernels {
   void (*keep_nearest)(const float* distances, const float* tolerance, std::size_t count, std::uint16_t label, float* nearest,
                        std::uint16_t* labels);
 
-  /// Fills a strip from `count` tight rows of `dimension` columns, less the pivot, with `limit` for each that is finite; `finite` gets a bit
-  /// for each, in whole words of the strip.
-  void (*split)(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, Strip& strip,
-                std::uint64_t* finite);
+  /// Fills a strip from `count` tight rows of `dimension` columns, less the pivot. Those that are finite get `limit`, or their cap where
+  /// `caps` is not null, and a bit in `finite`, of which a whole strip's words are written.
+  void (*split)(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, const float* caps,
+                Strip& strip, std::uint64_t* finite);
 
   /// Of all finite points, each with weight 1; in double, so that the moments tell a plane from a line.
   void (*sum_all)(const Strip& strip, std::size_t dimension, StripSums& sums);

@@ -18,23 +18,37 @@ std::size_t run_count(const PointsView& points) { return (points.count + kRunPoi
 
 using Pivot = std::array<double, kMaxDimension>;
 
-/// A place among the strip's points: the median, a column, of a few of them, so that a stray does not cost the others their precision.
+/// Columns of a row as double; false if one is not finite.
+template <class S>
+bool read_row(const PointsView& points, std::size_t row, Pivot& x) {
+  const char* from = static_cast<const char*>(points.data) + row * points.stride;
+  S probe = 0;
+  for (std::size_t d = 0; d < static_cast<std::size_t>(points.dimension); ++d, from += sizeof(S)) {
+    S value;
+    std::memcpy(&value, from, sizeof value);
+    probe += value * S{0};  // stays 0 unless a column is NaN or infinite
+    x[d] = static_cast<double>(value);
+  }
+  return probe == 0;
+}
+
+/// A place among the strip's points: the median, a column, of three of them, so that a stray does not cost the others their precision.
+template <class S>
 Pivot choose_pivot(const PointsView& points, std::size_t first, std::size_t count) {
-  constexpr std::size_t kAsked = 5;
-  std::array<std::array<double, kAsked>, kMaxDimension> values{};
-  std::size_t found = 0;
-  const auto ask = [&](std::size_t row) {
-    if (!points.finite(row)) return;
-    for (int d = 0; d < points.dimension; ++d) values[static_cast<std::size_t>(d)][found] = points.at(row, d);
-    ++found;
-  };
-  for (std::size_t k = 0; k < kAsked; ++k) ask(first + k * (count - 1) / kAsked);
-  for (std::size_t i = 0; found == 0 && i < count; ++i) ask(first + i);
+  constexpr std::size_t kAsked = 3, kProbes = 16;
+  std::array<Pivot, kAsked> found{};
+  std::size_t known = 0;
+  for (std::size_t probe = 0; probe < kProbes && known < kAsked; ++probe) {
+    // First, middle and last of the strip, and places in between while these are not finite.
+    const std::size_t row = probe < kAsked ? probe * (count - 1) / (kAsked - 1) : probe * count / kProbes;
+    known += read_row<S>(points, first + row, found[known]) ? 1 : 0;
+  }
+  for (std::size_t row = 0; known == 0 && row < count; ++row) known += read_row<S>(points, first + row, found[0]) ? 1 : 0;
+  if (known == 0) return {};
+  if (known < kAsked) return found[0];
   Pivot pivot{};
-  for (std::size_t d = 0; found > 0 && d < kMaxDimension; ++d) {
-    const auto middle = values[d].begin() + static_cast<std::ptrdiff_t>(found / 2);
-    std::nth_element(values[d].begin(), middle, values[d].begin() + static_cast<std::ptrdiff_t>(found));
-    pivot[d] = *middle;
+  for (std::size_t d = 0; d < kMaxDimension; ++d) {
+    pivot[d] = std::max(std::min(found[0][d], found[1][d]), std::min(std::max(found[0][d], found[1][d]), found[2][d]));
   }
   return pivot;
 }
@@ -48,27 +62,29 @@ struct Bench {
   std::size_t first = 0, count = 0;
   std::vector<std::size_t> claimants;  ///< models that some point was given to
 
-  /// Strip number `index` of the points, with `limit` for the finite ones.
-  void load(const CpuKernels& kernels, const PointsView& points, std::size_t index, float limit) {
+  /// Strip number `index` of the points; those that are finite get `limit`, or their cap where there are any.
+  void load(const CpuKernels& kernels, const PointsView& points, std::size_t index, float limit, std::span<const float> all_caps = {}) {
     first = index * kStripPoints;
     count = std::min(kStripPoints, points.count - first);
-    pivot = choose_pivot(points, first, count);
+    const float* const caps = all_caps.empty() ? nullptr : all_caps.data() + first;
     const auto width = static_cast<std::size_t>(points.dimension);
     const char* from = static_cast<const char*>(points.data) + first * points.stride;
     std::array<float, kMaxDimension> origin{};
     if (points.scalar == Scalar::float32) {
+      pivot = choose_pivot<float>(points, first, count);
       for (std::size_t d = 0; d < width; ++d) origin[d] = static_cast<float>(pivot[d]);
       const bool tight = points.stride == width * sizeof(float) && reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0;
-      if (tight) return kernels.split(reinterpret_cast<const float*>(from), width, count, origin.data(), limit, strip, finite.data());
+      if (tight) return kernels.split(reinterpret_cast<const float*>(from), width, count, origin.data(), limit, caps, strip, finite.data());
       for (std::size_t i = 0; i < count; ++i, from += points.stride) std::memcpy(rows.data() + i * width, from, width * sizeof(float));
     } else {
+      pivot = choose_pivot<double>(points, first, count);
       for (std::size_t i = 0; i < count; ++i, from += points.stride) {
         std::array<double, kMaxDimension> row;
         std::memcpy(row.data(), from, width * sizeof(double));
         for (std::size_t d = 0; d < width; ++d) rows[i * width + d] = narrow(row[d] - pivot[d]);
       }
     }
-    kernels.split(rows.data(), width, count, origin.data(), limit, strip, finite.data());
+    kernels.split(rows.data(), width, count, origin.data(), limit, caps, strip, finite.data());
   }
 
   /// The sums' moments in the points' frame.
@@ -155,10 +171,7 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
   const std::size_t runs = run_count(points);
   evidence_.assign(runs * models.size(), {});
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    bench.load(kernels_, points, strip, how.tolerance);
-    for (std::size_t i = 0; !how.caps.empty() && i < bench.count; ++i) {
-      if (bench.strip.limit[i] >= 0) bench.strip.limit[i] = how.caps[bench.first + i];
-    }
+    bench.load(kernels_, points, strip, how.tolerance, how.caps);
     for (std::size_t m = 0; m < models.size(); ++m) {
       std::array<float, kMaxParameters> coefficients{};
       alignas(64) std::array<float, kStripPoints> told;
@@ -170,7 +183,8 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
         sums.cost = bench.be_nowhere(told);
       }
       bench.add(sums, evidence_[run * models.size() + m]);
-      if (!distances.empty()) std::copy_n(told.begin(), bench.count, distances.begin() + static_cast<std::ptrdiff_t>(bench.first));
+      if (!distances.empty())
+        std::copy_n(told.begin(), bench.count, distances.begin() + static_cast<std::ptrdiff_t>(m * points.count + bench.first));
     }
   });
   add_up(runs, evidence);

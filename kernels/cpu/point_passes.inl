@@ -42,13 +42,13 @@ HWY_INLINE void load_rows(const float* HWY_RESTRICT rows, Vector* x) {
 }
 
 template <std::size_t D>
-HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, const float* HWY_RESTRICT pivot, float limit, Strip& strip,
-                         std::uint64_t* HWY_RESTRICT finite) {
+HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, const float* HWY_RESTRICT pivot, float limit,
+                         const float* HWY_RESTRICT caps, Strip& strip, std::uint64_t* HWY_RESTRICT finite) {
   constexpr float kFar = 1e18F;  // its square is still a float
   const FloatTag d;
   const Vector zero = hn::Zero(d);
   std::fill(finite, finite + kStripPoints / 64, std::uint64_t{0});
-  const auto put = [&](std::size_t i, const float* from) HWY_ATTR {
+  const auto put = [&](std::size_t i, const float* from, Vector allowed) HWY_ATTR {
     Vector x[D];
     load_rows<D>(from, x);
     Vector probe = hn::Mul(x[0], zero);  // stays 0 unless a column is NaN or infinite
@@ -58,18 +58,20 @@ HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, cons
       const Vector centred = hn::Clamp(hn::Sub(x[c], hn::Set(d, pivot[c])), hn::Set(d, -kFar), hn::Set(d, kFar));
       hn::Store(hn::IfThenElseZero(usable, centred), d, strip.columns[c].data() + i);
     }
-    hn::Store(hn::IfThenElse(usable, hn::Set(d, limit), hn::Set(d, -1.0F)), d, strip.limit.data() + i);
+    hn::Store(hn::IfThenElse(usable, allowed, hn::Set(d, -1.0F)), d, strip.limit.data() + i);
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, usable, bits);
     finite[i / 64] |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << (i % 64);
   };
   const std::size_t whole = count - count % lanes();
-  for (std::size_t i = 0; i < whole; i += lanes()) put(i, rows + i * D);
-  HWY_ALIGN float last[D * lanes()];
+  const Vector same = hn::Set(d, limit);
+  for (std::size_t i = 0; i < whole; i += lanes()) put(i, rows + i * D, caps != nullptr ? hn::LoadU(d, caps + i) : same);
+  HWY_ALIGN float last[D * lanes()], last_caps[lanes()] = {};
   for (std::size_t i = whole; i % kMaxLanes != 0 || i < count; i += lanes()) {
     std::fill(last, last + D * lanes(), std::numeric_limits<float>::quiet_NaN());
     if (i < count) std::copy(rows + i * D, rows + count * D, last);
-    put(i, last);
+    if (i < count && caps != nullptr) std::copy(caps + i, caps + count, last_caps);
+    put(i, last, caps != nullptr ? hn::Load(d, last_caps) : same);
   }
   strip.count = count;
 }
@@ -82,9 +84,9 @@ HWY_INLINE void with_dimension(std::size_t dimension, Body&& body) {
   body.template operator()<4>();
 }
 
-void split(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, Strip& strip,
+void split(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, const float* caps, Strip& strip,
            std::uint64_t* finite) {
-  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { split_of<D>(rows, count, pivot, limit, strip, finite); });
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { split_of<D>(rows, count, pivot, limit, caps, strip, finite); });
 }
 
 template <std::size_t D>
