@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/models/scalar_math.hpp"
 
 #define SWARMFIT_INLINE inline
 
@@ -12,11 +13,6 @@ namespace swarmfit::kernels {
 namespace {
 
 #include "kernels/models/models.inl"
-
-struct ScalarMath {
-  double mul_add(double a, double b, double c) const { return a * b + c; }
-  double set(double v) const { return v; }
-};
 
 /// A model's residual about a centre; infinite where a coefficient is not finite.
 class Residual {
@@ -36,7 +32,7 @@ class Residual {
   ModelKind kind_;
   const double* centre_;
   bool usable_;
-  std::array<double, kMaxParameters> coefficients_{};
+  std::array<double, kMaxCoefficients> coefficients_{};
 };
 
 Moments of_point(const PointsView& points, std::size_t row, double weight) {

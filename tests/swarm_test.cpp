@@ -157,7 +157,8 @@ TEST_P(KnownLandscape, SwarmConvergesOnTheOptimum) {
   settings.iterations = 400;
   const Random random(11);
   const Subset subset(points, random, 1000);
-  const Sampler sampler(points, subset.index(), *space, random);
+  const models::Neighbours none;
+  const Sampler sampler(points, subset.index(), none, *space, random);
   Landscape landscape(bowl, *space, points.frame(), settings);
   Swarm swarm(*space, settings, random);
   ASSERT_TRUE(swarm.start(sampler, 0, {}));

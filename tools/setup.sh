@@ -10,6 +10,7 @@ packages=(
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools
   # libraries
   libhwy-dev libtbb-dev libeigen3-dev librandom123-dev libexpected-dev libcli11-dev nlohmann-json3-dev libfmt-dev liblzf-dev
+  libnanoflann-dev
   libopencv-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev

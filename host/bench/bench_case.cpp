@@ -52,15 +52,15 @@ class Recorder final : public kernels::FitnessEvaluator {
   std::vector<Step>& steps_;
 };
 
-Expected<> fly(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& working,
-               std::size_t particles, std::uint64_t seed) {
+Expected<> fly(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, models::WorkingPoints& working, std::size_t particles,
+               std::uint64_t seed) {
   FitOptions options;
   options.model = space.type();
   swarm::Settings settings = swarm::resolve(options, working.finite_count(), kThreshold);
   settings.particles = static_cast<int>(particles);
   const swarm::Random random(seed);
-  const swarm::Subset subset(working, random, swarm::kSampledFrom);
-  const swarm::Sampler sampler(working, subset.index(), space, random);
+  const swarm::Part part = swarm::look_closely(working, space, random, swarm::kSampledFrom);
+  const swarm::Sampler sampler(working, part.points.index(), part.neighbours, space, random);
   swarm::Landscape landscape(evaluator, space, working.frame(), settings);
   swarm::Swarm swarm(space, settings, random);
   if (!swarm.start(sampler, 0, {})) return fail(Error::Kind::bad_input, "the points determine no model: all samples are degenerate");
@@ -115,7 +115,7 @@ std::vector<float> synthetic_points(int dimension, std::size_t count, std::uint6
 }
 
 Expected<Case> make_case(ModelType type, const PointsView& points, std::size_t particles, std::uint64_t seed, int threads) {
-  const models::WorkingPoints working(points);
+  models::WorkingPoints working(points);
   const auto space = models::make_space(type, std::nullopt);
   if (working.finite_count() < static_cast<std::size_t>(space->minimal_sample())) {
     return fail(Error::Kind::bad_input, fmt::format("finite points is {}, must be >= {} to bench a {}", working.finite_count(),

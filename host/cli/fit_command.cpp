@@ -42,7 +42,7 @@ Expected<> apply_prior(const FitArguments& arguments, FitOptions& options) {
   if (!arguments.normal.empty() && vertical) return invalid("--normal excludes --gravity and --camera-tilt");
   if (vertical && options.model != ModelType::plane)
     return invalid(fmt::format("--gravity and --camera-tilt are for horizontal planes, not for {}", arguments.model));
-  const std::size_t columns = options.model == ModelType::line2d ? 2 : 3;
+  const std::size_t columns = dimension(options.model) == 2 ? 2 : 3;
   DirectionPrior prior;
   if (vertical) {
     const auto axis = arguments.vertical.axis();

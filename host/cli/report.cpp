@@ -16,10 +16,19 @@ std::size_t shown(const std::string& text) {
 bool is_number(const std::string& cell) { return !cell.empty() && cell.find_first_not_of("0123456789+-.e% ") == std::string::npos; }
 
 std::string parameters(const Model& m) {
-  const Eigen::Vector3d n = m.normal();
+  const Eigen::VectorXd& p = m.parameters;
   switch (m.type) {
-    case ModelType::line2d: return fmt::format("normal ({:7.4f}, {:7.4f})  offset {:.6g}", n.x(), n.y(), m.offset());
-    case ModelType::plane: return fmt::format("normal ({:7.4f}, {:7.4f}, {:7.4f})  offset {:.6g}", n.x(), n.y(), n.z(), m.offset());
+    case ModelType::line2d: return fmt::format("normal ({:7.4f}, {:7.4f})  offset {:.6g}", p[0], p[1], p[2]);
+    case ModelType::plane: return fmt::format("normal ({:7.4f}, {:7.4f}, {:7.4f})  offset {:.6g}", p[0], p[1], p[2], p[3]);
+    case ModelType::circle2d: return fmt::format("centre ({:.6g}, {:.6g})  radius {:.6g}", p[0], p[1], p[2]);
+    case ModelType::sphere: return fmt::format("centre ({:.6g}, {:.6g}, {:.6g})  radius {:.6g}", p[0], p[1], p[2], p[3]);
+    case ModelType::cylinder:
+      return fmt::format("through ({:.4g}, {:.4g}, {:.4g})  axis ({:.3f}, {:.3f}, {:.3f})  radius {:.4g}", p[0], p[1], p[2], p[3], p[4],
+                         p[5], p[6]);
+    case ModelType::homography:
+    case ModelType::fundamental:
+      return fmt::format("[{:.3g} {:.3g} {:.3g}; {:.3g} {:.3g} {:.3g}; {:.3g} {:.3g} {:.3g}]", p[0], p[1], p[2], p[3], p[4], p[5], p[6],
+                         p[7], p[8]);
   }
   return {};
 }

@@ -39,6 +39,12 @@ std::string parameters(const Model& model) {
   switch (model.type) {
     case ModelType::line2d:
     case ModelType::plane: return fmt::format(R"({{"normal":{},"offset":{}}})", list(p, p.size() - 1), number(model.offset()));
+    case ModelType::circle2d:
+    case ModelType::sphere: return fmt::format(R"({{"centre":{},"radius":{}}})", list(p, p.size() - 1), number(p[p.size() - 1]));
+    case ModelType::cylinder:
+      return fmt::format(R"({{"point":{},"axis":{},"radius":{}}})", list(p.head<3>(), 3), list(p.segment<3>(3), 3), number(p[6]));
+    case ModelType::homography:
+    case ModelType::fundamental: return fmt::format(R"({{"matrix":{}}})", rows(p.reshaped<Eigen::RowMajor>(3, 3)));
   }
   return "{}";
 }

@@ -22,6 +22,7 @@ class Hyperplane : public ModelSpace {
   }
 
   int minimal_sample() const noexcept override { return D; }
+  int least_rank() const noexcept override { return D - 1; }
   int parameter_count() const noexcept override { return D + 1; }
   int freedom() const noexcept override { return D; }
 

@@ -1,6 +1,7 @@
 // The table of kinds: a new model is a row here and a file beside this one.
 #include "host/models/model_space.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string>
 
@@ -19,6 +20,11 @@ struct Kind {
 constexpr std::array kKinds{
     Kind{ModelType::line2d, kernels::ModelKind::line2d, make_line2d_space},
     Kind{ModelType::plane, kernels::ModelKind::plane, make_plane_space},
+    Kind{ModelType::circle2d, kernels::ModelKind::circle2d, make_circle2d_space},
+    Kind{ModelType::sphere, kernels::ModelKind::sphere, make_sphere_space},
+    Kind{ModelType::cylinder, kernels::ModelKind::cylinder, make_cylinder_space},
+    Kind{ModelType::homography, kernels::ModelKind::homography, make_homography_space},
+    Kind{ModelType::fundamental, kernels::ModelKind::fundamental, make_fundamental_space},
 };
 
 const Kind& row(ModelType type) noexcept {
@@ -29,6 +35,10 @@ const Kind& row(ModelType type) noexcept {
 }
 
 }  // namespace
+
+double ModelSpace::noise_variance(const WorkingPoints&, const Weighted& support, const Position&, double squares) const {
+  return squares / std::max(1.0, static_cast<double>(support.index.size()) - freedom());
+}
 
 std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior) { return row(type).make(prior); }
 kernels::ModelKind to_kernel(ModelType type) noexcept { return row(type).kernel; }

@@ -36,6 +36,10 @@ class ModelSpace {
   virtual int minimal_sample() const noexcept = 0;
   /// Entries of a position.
   virtual int parameter_count() const noexcept = 0;
+  /// Dimension of the smallest flat that points must span to determine a model.
+  virtual int least_rank() const noexcept = 0;
+  /// Whether from_sample looks at the points' normals.
+  virtual bool needs_normals() const noexcept { return false; }
   /// Degrees of freedom: rank of the covariance.
   virtual int freedom() const noexcept = 0;
 
@@ -58,6 +62,10 @@ class ModelSpace {
   virtual bool refine_by_moments(const kernels::Moments&, const Frame&, Position&) const { return false; }
   virtual Eigen::MatrixXd covariance_by_moments(const kernels::Moments&, const Frame&, const Position&) const { return {}; }
 
+  /// Variance of one residual component about a least-squares position; `squares` is the sum of squared distances [working frame]. Of kinds
+  /// in closed form `support` is not looked at beyond its size.
+  virtual double noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double squares) const;
+
   /// Parameters in the data's frame and unit, as results and kernels take them, and back.
   virtual Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const = 0;
   virtual Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const = 0;
@@ -77,5 +85,10 @@ kernels::ModelKind to_kernel(ModelType type) noexcept;
 // One factory a kind, each in its own file.
 std::unique_ptr<ModelSpace> make_line2d_space(const std::optional<DirectionPrior>& prior);
 std::unique_ptr<ModelSpace> make_plane_space(const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_circle2d_space(const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_sphere_space(const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_cylinder_space(const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_homography_space(const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_fundamental_space(const std::optional<DirectionPrior>& prior);
 
 }  // namespace swarmfit::models

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -53,6 +54,12 @@ class WorkingPoints {
     return p;
   }
 
+  /// Unit normals, one a point; those that are not known are zero. None are known until they are set.
+  void set_normals(std::vector<Eigen::Vector3f> normals) noexcept { normals_ = std::move(normals); }
+  Eigen::Vector3d normal(std::size_t i) const noexcept {
+    return normals_.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(normals_[i].cast<double>());
+  }
+
   /// Weighted sums over points of the working frame: total weight, sum w x, sum w x x^T. One pass, in index order.
   template <int D>
   void accumulate(std::span<const std::uint32_t> index, std::span<const double> weight, double& total, Eigen::Matrix<double, D, 1>& sum,
@@ -92,6 +99,7 @@ class WorkingPoints {
   kernels::Survey survey_;
   Frame frame_;
   int rank_ = 0;
+  std::vector<Eigen::Vector3f> normals_;
 };
 
 }  // namespace swarmfit::models

@@ -16,11 +16,22 @@
 namespace swarmfit {
 namespace {
 
-constexpr double kPlaneThreshold = 0.01;  // [m]
+constexpr double kSurface = 0.01;     // [m]
+constexpr double kHomography = 6.0;   // [px]
+constexpr double kFundamental = 2.5;  // [px]
 
 /// The kind's fixed default, or none where the threshold is estimated.
 std::optional<double> default_threshold(ModelType type) {
-  return type == ModelType::plane ? std::optional<double>(kPlaneThreshold) : std::nullopt;
+  switch (type) {
+    case ModelType::line2d:
+    case ModelType::circle2d: return std::nullopt;
+    case ModelType::plane:
+    case ModelType::sphere:
+    case ModelType::cylinder: return kSurface;
+    case ModelType::homography: return kHomography;
+    case ModelType::fundamental: return kFundamental;
+  }
+  return std::nullopt;
 }
 
 Expected<> check_points(const PointsView& points, const models::WorkingPoints& working, const models::ModelSpace& space) {
@@ -32,11 +43,11 @@ Expected<> check_points(const PointsView& points, const models::WorkingPoints& w
     return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= {} to fit a {}", working.finite_count(),
                                                     points.size(), least, name(space.type())));
   }
-  if (working.rank() < space.minimal_sample() - 1) {
-    const char* shape = working.rank() == 0 ? "all coincide" : "are collinear";
+  if (working.rank() < space.least_rank()) {
+    static constexpr const char* kShapes[] = {"all coincide", "are collinear", "are coplanar"};
     return fail(Error::Kind::bad_input,
-                fmt::format("the {} finite points {}: rank is {}, must be >= {} to fit a {}", working.finite_count(), shape, working.rank(),
-                            space.minimal_sample() - 1, name(space.type())));
+                fmt::format("the {} finite points {}: rank is {}, must be >= {} to fit a {}", working.finite_count(),
+                            kShapes[working.rank()], working.rank(), space.least_rank(), name(space.type())));
   }
   return {};
 }
@@ -125,10 +136,10 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     if (!looked_at) return tl::unexpected(looked_at.error());
     thin = std::move(*looked_at);
   }
-  const models::WorkingPoints& working = thin_rows ? thin : *whole;
+  models::WorkingPoints& working = thin_rows ? thin : *whole;
   const bool searches_part = settings.searches_part(working.finite_count());
-  const swarm::Subset part(working, random, searches_part ? settings.search_points : swarm::kSampledFrom);
-  const kernels::Workload workload{space->kind(), searches_part ? part.index().size() : working.size(),
+  const swarm::Part part = swarm::look_closely(working, *space, random, searches_part ? settings.search_points : swarm::kSampledFrom);
+  const kernels::Workload workload{space->kind(), searches_part ? part.points.index().size() : working.size(),
                                    static_cast<std::size_t>(settings.particles)};
   if (const auto support = evaluator.supports(workload); !support) return fail(Error::Kind::backend_unavailable, support.reason);
 
@@ -150,6 +161,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     for (models::Position& theta : found) theta = space->from_data(space->to_data(theta, working.frame()), whole->frame());
     if (auto done = swarm::refit(ground, found); !done) return tl::unexpected(done.error());
   }
+  result.labels = thin_rows ? std::vector<std::uint16_t>{} : search.labels();
   if (auto done = swarm::settle(ground, found, result); !done) return tl::unexpected(done.error());
   result.backend = backend();
   result.seed = options.seed;

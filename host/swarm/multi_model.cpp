@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host/swarm/deflation.hpp"
+#include "host/swarm/labelling.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/swarm.hpp"
@@ -18,19 +19,20 @@ constexpr int kFullRounds = 1;    // of refinement on all points, where it was d
 }  // namespace
 
 MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points,
-                       const Subset& part, const Settings& settings, std::uint64_t seed, Limits limits)
+                       const Part& part, const Settings& settings, std::uint64_t seed, Limits limits)
     : evaluator_(evaluator),
       space_(space),
       points_(points),
       settings_(settings),
       random_(seed),
       limits_(std::move(limits)),
-      part_(part),
+      part_(part.points),
+      neighbours_(part.neighbours),
       part_searched_(settings.searches_part(points.finite_count())),
       landscape_(evaluator, space, points.frame(), settings),
       tau_(static_cast<float>(settings.threshold)),
       ground_{evaluator, space, points, tau_},
-      part_ground_{evaluator, space, points, tau_, &part},
+      part_ground_{evaluator, space, points, tau_, &part_},
       distances_(points.size()) {
   restore_caps();
 }
@@ -109,7 +111,7 @@ double MultiModel::loss_of_nothing() const {
 
 Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta,
                                                  double& loss) {
-  Sampler sampler(points_, part_.index(), space_, random_);
+  Sampler sampler(points_, part_.index(), neighbours_, space_, random_);
   sampler.prefer_unexplained(caps_, static_cast<float>(settings_.threshold));
   scale_ = loss_of_nothing();
   Swarm swarm(space_, settings_, random_);
@@ -127,6 +129,7 @@ Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<
   }
   steps_ = static_cast<std::size_t>(swarm.steps());
   theta = swarm.best();
+  if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
   if (auto done = refine(theta, loss); !done) return tl::unexpected(done.error());
   support_ = count_support(distances_, caps_, tau_);
   if (pays(support_, settings_, space_.minimal_sample())) return Outcome::found;
@@ -178,6 +181,7 @@ Expected<> MultiModel::deflate() {
 Expected<> MultiModel::finish(FitResult& result) {
   if (settings_.joint && !found_.empty() && !limits_.stop.stop_requested()) {
     if (auto done = polish(); !done) return done;
+    if (shares_out()) return share_out(result);
     // With many points the polished models are where the joint refit would leave them.
     if (!part_searched_) {
       if (auto energy = refine_jointly(ground_, found_); !energy) return tl::unexpected(energy.error());
@@ -185,6 +189,25 @@ Expected<> MultiModel::finish(FitResult& result) {
     if (auto done = drop_unpaid(result); !done) return done;
     for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
   }
+  count_effort(result);
+  return {};
+}
+
+bool MultiModel::shares_out() const noexcept { return settings_.joint && !part_searched_ && settings_.prices.smoothness > 0; }
+
+Expected<> MultiModel::share_out(FitResult& result) {
+  Labelling labelling(ground_, part_, neighbours_, settings_.prices);
+  if (auto done = labelling.settle(found_, proposals_); !done) return done;
+  std::vector<Model> kept;
+  for (const std::size_t m : labelling.kept()) {
+    kept.emplace_back();
+    if (m != Labelling::kJoined) kept.back() = std::move(result.models[m]);
+    kept.back().type = space_.type();
+  }
+  result.models = std::move(kept);
+  for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
+  labels_.resize(points_.size());
+  labelling.write(labels_);
   count_effort(result);
   return {};
 }

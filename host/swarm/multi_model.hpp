@@ -32,13 +32,15 @@ class MultiModel {
  public:
   /// `points`: the whole cloud, or a thinned one of the size that the settings were resolved for. `part` is what samples are drawn from, and
   /// where the settings say so what swarms search. `evaluator` is given what is searched.
-  MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points, const Subset& part,
+  MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points, const Part& part,
              const Settings& settings, std::uint64_t seed, Limits limits);
 
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle().
   Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result);
   /// Positions of the result's models in the frame of the points.
   const std::vector<models::Position>& found() const noexcept { return found_; }
+  /// Labels of the points where they were shared out jointly, with an eye to their neighbours; else empty, and the nearest model owns each.
+  const std::vector<std::uint16_t>& labels() const noexcept { return labels_; }
 
  private:
   enum class Outcome { found, unpaid, complete, interrupted };
@@ -49,6 +51,7 @@ class MultiModel {
   Expected<> deflate();
   Expected<> finish(FitResult& result);
   Expected<> polish();
+  Expected<> share_out(FitResult& result);
   Expected<> drop_unpaid(FitResult& result);
   std::optional<std::string> interrupted() const;
   void restore_caps();
@@ -56,6 +59,7 @@ class MultiModel {
   void count_effort(FitResult& result) const;
   double elapsed_ms() const;
   double loss_of_nothing() const;
+  bool shares_out() const noexcept;
   int full_rounds() const noexcept;  ///< of refinement on all points
   const Ground& searched() const noexcept { return part_searched_ ? part_ground_ : ground_; }
 
@@ -66,6 +70,7 @@ class MultiModel {
   Random random_;
   Limits limits_;
   const Subset& part_;
+  const models::Neighbours& neighbours_;
   const bool part_searched_;
   Landscape landscape_;  // of the points that are searched
   float tau_;
@@ -73,6 +78,8 @@ class MultiModel {
   std::vector<float> caps_, part_caps_, distances_;  // one a point; caps are what is left to explain, in both kinds of deflation
   Support support_;                                  // of the last candidate
   std::vector<models::Position> found_;
+  std::vector<models::Position> proposals_;  // what the joint end may add to them
+  std::vector<std::uint16_t> labels_;
   double scale_ = 0;  // loss of a model that explains nothing
   std::size_t steps_ = 0;
   std::string stop_reason_;

@@ -45,7 +45,7 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
 }
 
 Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
-                                    const models::WorkingPoints& points, const Subset& part, std::size_t finite_points,
+                                    const models::WorkingPoints& points, const Part& part, std::size_t finite_points,
                                     const FitOptions& options) {
   const double unit = points.frame().scale;
   double tau = kGenerous * unit;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
+#include <utility>
 
 namespace swarmfit::swarm {
 namespace {
@@ -9,24 +11,54 @@ namespace {
 constexpr std::uint32_t kAttempts = 32;  // of a sample that turns out degenerate
 constexpr double kNearby = 0.003;        // of the candidates, on each side of a point in their order, are nearby
 constexpr std::size_t kLeastNearby = 12;
+constexpr std::size_t kMostNeighbours = 32;
 
 }  // namespace
 
-Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint32_t> candidates, const models::ModelSpace& space,
-                 const Random& random)
-    : points_(points), space_(space), random_(random), candidates_(candidates), live_(candidates.begin(), candidates.end()) {}
+Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint32_t> candidates, const models::Neighbours& neighbours,
+                 const models::ModelSpace& space, const Random& random)
+    : points_(points), space_(space), random_(random), candidates_(candidates), neighbours_(neighbours), live_(candidates.size()) {
+  std::iota(live_.begin(), live_.end(), 0U);
+  alive_.assign(candidates.size(), 1);
+}
 
 void Sampler::prefer_unexplained(std::span<const float> caps, float full) {
   live_.clear();
-  for (const std::uint32_t i : candidates_) {
-    if (caps[i] >= 0.5F * full) live_.push_back(i);
+  for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
+    alive_[place] = caps[candidates_[place]] >= 0.5F * full ? 1 : 0;
+    if (alive_[place] != 0) live_.push_back(place);
   }
-  if (live_.size() < static_cast<std::size_t>(4 * space_.minimal_sample())) live_.assign(candidates_.begin(), candidates_.end());
+  if (live_.size() >= static_cast<std::size_t>(4 * space_.minimal_sample())) return;
+  live_.resize(candidates_.size());
+  std::iota(live_.begin(), live_.end(), 0U);
+  alive_.assign(candidates_.size(), 1);
+}
+
+bool Sampler::nearby(std::size_t first, std::span<const std::uint32_t> words, std::span<std::uint32_t> places) const {
+  if (neighbours_.empty()) {
+    const std::size_t reach = std::max(kLeastNearby, static_cast<std::size_t>(kNearby * static_cast<double>(candidates_.size())));
+    const std::size_t low = first > reach ? first - reach : 0;
+    const std::size_t width = std::min(live_.size(), first + reach + 1) - low;
+    for (std::size_t k = 0; k < places.size(); ++k) places[k] = live_[low + Random::below(words[k], width)];
+    return true;
+  }
+  std::array<std::uint32_t, kMostNeighbours> near{};
+  std::size_t count = 0;
+  for (const std::uint32_t place : neighbours_.of(live_[first])) {
+    if (alive_[place] != 0 && count < near.size()) near[count++] = place;
+  }
+  if (count < places.size()) return false;
+  // Without repetition: a sample that holds a point twice is degenerate.
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const std::size_t at = k + Random::below(words[k], count - k);
+    std::swap(near[k], near[at]);
+    places[k] = near[k];
+  }
+  return true;
 }
 
 bool Sampler::draw(bool local, std::uint32_t round, std::uint32_t step, std::uint32_t particle, models::Position& theta) const {
   const auto wanted = static_cast<std::size_t>(space_.minimal_sample());
-  const std::size_t reach = std::max(kLeastNearby, static_cast<std::size_t>(kNearby * static_cast<double>(candidates_.size())));
   std::array<std::uint32_t, 8> sample{}, words{};
   for (std::uint32_t attempt = 0; attempt < kAttempts; ++attempt) {
     for (std::uint32_t block = 0; block < 2; ++block) {
@@ -35,14 +67,12 @@ bool Sampler::draw(bool local, std::uint32_t round, std::uint32_t step, std::uin
     }
     const std::size_t first = Random::below(words[0], live_.size());
     sample[0] = live_[first];
+    const std::span<std::uint32_t> others(sample.data() + 1, wanted - 1);
+    const bool near = local && nearby(first, std::span(words).subspan(1), others);
     for (std::size_t k = 1; k < wanted; ++k) {
-      std::size_t at = Random::below(words[k], live_.size());
-      if (local) {
-        const std::size_t low = first > reach ? first - reach : 0;
-        at = low + Random::below(words[k], std::min(live_.size(), first + reach + 1) - low);
-      }
-      sample[k] = live_[at];
+      if (!near) sample[k] = live_[Random::below(words[k], live_.size())];
     }
+    for (std::size_t k = 0; k < wanted; ++k) sample[k] = candidates_[sample[k]];
     if (space_.from_sample(points_, std::span<const std::uint32_t>(sample.data(), wanted), theta)) return true;
   }
   return false;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/models/model_space.hpp"
+#include "host/models/neighbours.hpp"
 #include "host/swarm/random.hpp"
 
 namespace swarmfit::swarm {
@@ -13,8 +14,9 @@ namespace swarmfit::swarm {
 class Sampler {
  public:
   /// `candidates`: input indices that samples are drawn from, neighbours in the list being neighbours in space.
-  Sampler(const models::WorkingPoints& points, std::span<const std::uint32_t> candidates, const models::ModelSpace& space,
-          const Random& random);
+  /// `neighbours`: of the candidates among themselves; where empty, neighbours in the list are nearby.
+  Sampler(const models::WorkingPoints& points, std::span<const std::uint32_t> candidates, const models::Neighbours& neighbours,
+          const models::ModelSpace& space, const Random& random);
 
   /// A model through a sample. `local`: of nearby points. False if some tens of samples were all degenerate.
   bool draw(bool local, std::uint32_t round, std::uint32_t step, std::uint32_t particle, models::Position& theta) const;
@@ -26,8 +28,13 @@ class Sampler {
   const models::WorkingPoints& points_;
   const models::ModelSpace& space_;
   const Random& random_;
+  /// Fills places with others near the live candidate at `first`; false where too few are live.
+  bool nearby(std::size_t first, std::span<const std::uint32_t> words, std::span<std::uint32_t> places) const;
+
   std::span<const std::uint32_t> candidates_;
-  std::vector<std::uint32_t> live_;
+  const models::Neighbours& neighbours_;
+  std::vector<std::uint32_t> live_;  // places in candidates_
+  std::vector<std::uint8_t> alive_;  // one a candidate
 };
 
 }  // namespace swarmfit::swarm

@@ -45,7 +45,11 @@ Expected<> FitOptions::validate() const {
   for (Expected<>& check : checks) {
     if (!check) return std::move(check);
   }
-  return prior ? check_prior(*prior) : Expected<>{};
+  if (!prior) return {};
+  if (model != ModelType::line2d && model != ModelType::plane && model != ModelType::cylinder) {
+    return fail(Error::Kind::invalid_option, fmt::format("prior is given for a {}, must be for a line2d, plane or cylinder", name(model)));
+  }
+  return check_prior(*prior);
 }
 
 namespace swarm {
@@ -71,6 +75,15 @@ Settings preset(Preset preset) {
   return s;
 }
 
+/// Two views: eight dimensions are too many for a swarm to settle in by flight alone, so most particles start anew at every step; and
+/// points of one surface or body lie together in both images.
+Settings for_correspondences(Settings s, ModelType type) {
+  if (!s.joint) return s;
+  s.renewal_share = 0.75;
+  s.prices = type == ModelType::homography ? LabelPrices{0.1, 7} : LabelPrices{0.2, 10};
+  return s;
+}
+
 }  // namespace
 
 Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold) {
@@ -82,6 +95,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
   s.threshold = threshold;
+  if (dimension(options.model) == 4) s = for_correspondences(s, options.model);
   const std::size_t fitted = s.fit_points > 0 ? std::min(s.fit_points, finite_points) : finite_points;
   s.stands_for = fitted > 0 ? static_cast<double>(finite_points) / static_cast<double>(fitted) : 1.0;
   // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.

@@ -7,6 +7,12 @@
 
 namespace swarmfit::swarm {
 
+/// What a labelling costs, in units of what leaving one point unexplained costs.
+struct LabelPrices {
+  double smoothness = 0;  ///< two neighbours with different labels, for each of the two that counts the other among its nearest
+  double model = 0;       ///< a model that is used at all
+};
+
 /// Whom a particle follows beside itself.
 enum class Topology {
   roulette,  ///< one of the last n global bests, Eq. (2)
@@ -36,6 +42,7 @@ struct Settings {
   int patience = 2;             ///< swarms in a row whose best does not pay before the fit ends
   bool refine = true;           ///< least squares on the inliers of what converged
   bool joint = true;            ///< refine all models together at the end
+  LabelPrices prices;           ///< of the joint end; where smoothness is 0 each point goes to the nearest model
   double threshold = 0.01;      ///< tau [data unit]
   std::size_t min_inliers = 0;  ///< resolved, >= 1
 

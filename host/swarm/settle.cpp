@@ -25,17 +25,42 @@ class Views {
   std::vector<kernels::ModelView> views_;
 };
 
-/// Given unit residual variance; from the points themselves where their moments do not tell it.
-Eigen::MatrixXd unit_covariance(const Ground& whole, const kernels::Evidence& evidence, std::span<const std::uint16_t> labels,
-                                std::size_t label, const models::Position& theta) {
-  if (whole.space.closed_form()) return whole.space.covariance_by_moments(evidence.moments, whole.points.frame(), theta);
+/// Counts and squares of the points that each model owns already.
+Expected<> weigh_own(const Ground& whole, std::span<const kernels::ModelView> models, std::span<const std::uint16_t> labels,
+                     std::span<kernels::Evidence> evidence) {
+  std::vector<float> distances(labels.size() * models.size());
+  if (auto done = whole.evaluator.weigh(whole.view(), {whole.tau, 1, {}}, models, distances, evidence); !done) {
+    return tl::unexpected(to_error(done.error()));
+  }
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    evidence[m].count = 0;
+    evidence[m].square = 0;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      if (labels[i] != m + 1) continue;
+      const auto d = static_cast<double>(distances[m * labels.size() + i]);
+      ++evidence[m].count;
+      evidence[m].square += d * d;
+    }
+  }
+  return {};
+}
+
+/// In the working frame; from the points themselves where their moments do not tell it.
+Eigen::MatrixXd covariance(const Ground& whole, const kernels::Evidence& evidence, std::span<const std::uint16_t> labels, std::size_t label,
+                           const models::Position& theta) {
+  const double scale = whole.points.frame().scale, squares = evidence.square / (scale * scale);
+  if (whole.space.closed_form()) {
+    const double degrees = std::max(1.0, static_cast<double>(evidence.count) - whole.space.freedom());
+    return squares / degrees * whole.space.covariance_by_moments(evidence.moments, whole.points.frame(), theta);
+  }
   std::vector<std::uint32_t> own;
   own.reserve(evidence.count);
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] == label) own.push_back(static_cast<std::uint32_t>(i));
   }
   const std::vector<double> weight(own.size(), 1.0);
-  return whole.space.unit_covariance(whole.points, {own, weight}, theta);
+  const models::Weighted support{own, weight};
+  return whole.space.noise_variance(whole.points, support, theta, squares) * whole.space.unit_covariance(whole.points, support, theta);
 }
 
 }  // namespace
@@ -65,9 +90,13 @@ Expected<> settle(const Ground& whole, const std::vector<models::Position>& foun
   const models::Frame& frame = whole.points.frame();
   const Views models(whole, found);
   std::vector<kernels::Evidence> evidence(found.size());
-  result.labels.resize(whole.points.size());
-  if (auto done = whole.evaluator.claim(whole.view(), whole.tau, models.views(), result.labels, evidence); !done) {
-    return tl::unexpected(to_error(done.error()));
+  if (result.labels.empty()) {
+    result.labels.resize(whole.points.size());
+    if (auto done = whole.evaluator.claim(whole.view(), whole.tau, models.views(), result.labels, evidence); !done) {
+      return tl::unexpected(to_error(done.error()));
+    }
+  } else if (auto done = weigh_own(whole, models.views(), result.labels, evidence); !done) {
+    return done;
   }
   for (std::size_t m = 0; m < found.size(); ++m) {
     Model& model = result.models[m];
@@ -75,9 +104,7 @@ Expected<> settle(const Ground& whole, const std::vector<models::Position>& foun
     model.parameters = models.parameters(m);
     model.inliers = evidence[m].count;
     model.rms = n > 0 ? std::sqrt(evidence[m].square / n) : 0.0;
-    const double variance = evidence[m].square / std::max(1.0, n - whole.space.freedom()) / (frame.scale * frame.scale);
-    const Eigen::MatrixXd covariance = variance * unit_covariance(whole, evidence[m], result.labels, m + 1, found[m]);
-    model.covariance = whole.space.covariance_to_data(covariance, found[m], frame);
+    model.covariance = whole.space.covariance_to_data(covariance(whole, evidence[m], result.labels, m + 1, found[m]), found[m], frame);
   }
   return {};
 }

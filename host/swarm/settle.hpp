@@ -15,7 +15,7 @@ namespace swarmfit::swarm {
 Expected<> refit(const Ground& whole, std::vector<models::Position>& found);
 
 /// Labels of all points, and for each model of the result its parameters, inliers, rms and covariance. `result` holds a model for each of
-/// `found`, in that order.
+/// `found`, in that order. Where its labels are already one a point, they stay.
 Expected<> settle(const Ground& whole, const std::vector<models::Position>& found, FitResult& result);
 
 }  // namespace swarmfit::swarm

@@ -69,4 +69,17 @@ void Subset::gather(std::span<const float> all, std::vector<float>& values) cons
   for (std::size_t k = 0; k < index_.size(); ++k) values[k] = all[index_[k]];
 }
 
+Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size) {
+  constexpr std::size_t kNeighbours = 16;
+  Part part{Subset(points, random, size), {}};
+  const bool correspondences = points.dimension() > 3;
+  if (correspondences || space.needs_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
+  if (space.needs_normals()) {
+    std::vector<Eigen::Vector3f> normals;
+    models::estimate_normals(points, part.points.index(), part.neighbours, normals);
+    points.set_normals(std::move(normals));
+  }
+  return part;
+}
+
 }  // namespace swarmfit::swarm

@@ -6,6 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "host/models/model_space.hpp"
+#include "host/models/neighbours.hpp"
 #include "host/models/working_points.hpp"
 #include "host/swarm/random.hpp"
 
@@ -48,5 +50,15 @@ class Subset {
   std::vector<std::uint32_t> index_;
   Rows rows_;
 };
+
+/// The part of a cloud that is looked at closely.
+struct Part {
+  Subset points;
+  models::Neighbours neighbours;  ///< of its points among themselves; empty where nothing asks for them
+};
+
+/// A part of `size` points at most, with neighbourhoods where the kind has use for them. Gives `points` the normals of the part where
+/// minimal samples of the kind look at them.
+Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size);
 
 }  // namespace swarmfit::swarm

@@ -43,6 +43,7 @@ class Swarm {
   const std::deque<GlobalBest>& global_bests() const noexcept { return list_; }
   std::span<const models::Position> positions() const noexcept { return positions_; }
   std::span<const double> fitness() const noexcept { return fitness_; }
+  std::span<const models::Position> own_bests() const noexcept { return own_best_; }
 
  private:
   void remember();

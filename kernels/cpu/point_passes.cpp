@@ -105,7 +105,7 @@ struct Bench {
   /// A model's coefficients about the pivot; false if one is not finite.
   bool centre(const ModelView& model, float* coefficients) const {
     constexpr double kMost = 1e30;  // what float cannot hold is farther away than any point either way
-    std::array<double, kMaxParameters> wide{};
+    std::array<double, kMaxCoefficients> wide{};
     if (!centred_coefficients(model.kind, model.parameters.data(), pivot.data(), wide.data())) return false;
     for (std::size_t c = 0; c < wide.size(); ++c) coefficients[c] = static_cast<float>(std::clamp(wide[c], -kMost, kMost));
     return true;
@@ -173,7 +173,7 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
     bench.load(kernels_, points, strip, how.tolerance, how.caps);
     for (std::size_t m = 0; m < models.size(); ++m) {
-      std::array<float, kMaxParameters> coefficients{};
+      std::array<float, kMaxCoefficients> coefficients{};
       alignas(64) std::array<float, kStripPoints> told;
       StripSums sums;
       if (bench.centre(models[m], coefficients.data())) {
@@ -205,7 +205,7 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
     const auto width = static_cast<std::size_t>(points.dimension);
     Evidence* const of_run = evidence_.data() + run * models.size();
     for (std::size_t m = 0; m < models.size(); ++m) {
-      std::array<float, kMaxParameters> coefficients{};
+      std::array<float, kMaxCoefficients> coefficients{};
       if (!bench.centre(models[m], coefficients.data())) {
         of_run[m].cost += bench.be_nowhere(told);
         continue;

@@ -6,6 +6,7 @@
 
 #include "kernels/checks.hpp"
 #include "kernels/evaluators.hpp"
+#include "kernels/models/scalar_math.hpp"
 
 #define SWARMFIT_INLINE inline
 
@@ -13,17 +14,6 @@ namespace swarmfit::kernels {
 namespace {
 
 #include "kernels/models/models.inl"
-
-struct ScalarMath {
-  double add(double a, double b) const { return a + b; }
-  double sub(double a, double b) const { return a - b; }
-  double mul(double a, double b) const { return a * b; }
-  double div(double a, double b) const { return a / b; }
-  double sqrt(double a) const { return std::sqrt(a); }
-  double mul_add(double a, double b, double c) const { return a * b + c; }
-  double neg_mul_add(double a, double b, double c) const { return c - a * b; }
-  double ratio(double a, double b) const { return b > 0 ? a / b : std::numeric_limits<double>::infinity(); }
-};
 
 class ReferenceEvaluator final : public FitnessEvaluator {
  public:

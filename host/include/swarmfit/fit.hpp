@@ -29,7 +29,7 @@ enum class Deflation {
 };
 enum class Loss { truncated_l1, truncated_l2 };
 
-/// Only planes whose normal is within `max_angle` of `axis` (n and -n are one plane), or lines whose normal is.
+/// Only planes whose normal is within `max_angle` of `axis` (n and -n are one plane), or lines whose normal is, or cylinders whose axis is.
 struct DirectionPrior {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< need not be a unit vector; not zero
   double max_angle = 0.2;                           ///< [rad], in (0, pi/2]
@@ -37,7 +37,8 @@ struct DirectionPrior {
 
 struct FitOptions {
   ModelType model = ModelType::plane;
-  std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane 0.01), estimated where that is `auto`
+  std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane, sphere, cylinder 0.01;
+                                    ///< homography 6 px, fundamental 2.5 px; line2d and circle2d estimate it)
   bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
   Preset preset = Preset::fast;     ///< decides every option below that is left empty
   std::optional<int> particles;     ///< M, >= 2

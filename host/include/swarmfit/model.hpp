@@ -15,8 +15,13 @@
 namespace swarmfit {
 
 enum class ModelType {
-  line2d,  ///< points (x, y); parameters a, b, offset: a x + b y + offset = 0, a^2 + b^2 = 1
-  plane,   ///< points (x, y, z); parameters nx, ny, nz, offset: n . x + offset = 0, |n| = 1
+  line2d,       ///< points (x, y); parameters a, b, offset: a x + b y + offset = 0, a^2 + b^2 = 1
+  plane,        ///< points (x, y, z); parameters nx, ny, nz, offset: n . x + offset = 0, |n| = 1
+  circle2d,     ///< points (x, y); parameters cx, cy, radius
+  sphere,       ///< points (x, y, z); parameters cx, cy, cz, radius
+  cylinder,     ///< points (x, y, z); parameters px, py, pz, ax, ay, az, radius: a point of the axis, its unit direction
+  homography,   ///< points (x1, y1, x2, y2) [px]; parameters H row by row, |H| = 1: (x2, y2, 1) ~ H (x1, y1, 1)
+  fundamental,  ///< points (x1, y1, x2, y2) [px]; parameters F row by row, |F| = 1: (x2, y2, 1) F (x1, y1, 1)^T = 0, of rank 2
 };
 
 /// The name used on the command line and in result.json.
@@ -41,11 +46,11 @@ struct Model {
   double points_touched = 1;    ///< share of points x particles really computed, in [0, 1]
   double found_at_ms = 0;       ///< since the start of the fit
 
-  /// plane: the unit normal; line2d: the unit normal with z = 0.
+  /// plane: the unit normal; line2d: the unit normal with z = 0. Of these two only.
   Eigen::Vector3d normal() const {
     return type == ModelType::plane ? Eigen::Vector3d(parameters.head<3>()) : Eigen::Vector3d(parameters[0], parameters[1], 0);
   }
-  /// plane, line2d: offset in normal . x + offset = 0.
+  /// plane, line2d: offset in normal . x + offset = 0. Of these two only.
   double offset() const { return parameters[parameters.size() - 1]; }
 };
 

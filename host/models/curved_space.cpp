@@ -1,0 +1,115 @@
+#include "host/models/curved_space.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace swarmfit::models {
+namespace {
+
+constexpr int kSteps = 6;             // of Gauss-Newton; starting points are good, and callers repeat
+constexpr int kHalvings = 4;          // of damping before a step is given up
+constexpr double kSettled = 1e-7;     // relative fall of the squares below which steps end
+constexpr double kLeastRank = 1e-12;  // of the information matrix: below, the points do not determine the model
+
+}  // namespace
+
+double CurvedSpace::distance(const Position& a, const Position& b) const {
+  Eigen::VectorXd v(parameter_count());
+  difference(a, b, v);
+  return v.norm();
+}
+
+CurvedSpace::Equations CurvedSpace::equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
+  const int c = components(), f = freedom();
+  Equations sum{Normal::Zero(f, f), Chart::Zero(f), 0, 0};
+  const Basis chart = basis(theta);
+  Linear at;
+  Eigen::Matrix<double, kMostComponents, Eigen::Dynamic, 0, kMostComponents, kMostFreedom> row(kMostComponents, f);
+  for (std::size_t k = 0; k < support.index.size(); ++k) {
+    if (!linearise(points, support.index[k], theta, at)) continue;
+    const double w = support.weight[k];
+    row.topRows(c).noalias() = at.by_parameter.topLeftCorner(c, parameter_count()) * chart;
+    for (int i = 0; i < c; ++i) {
+      sum.information.template selfadjointView<Eigen::Lower>().rankUpdate(row.row(i).transpose(), w);
+      sum.gradient.noalias() += (w * at.residual[i]) * row.row(i).transpose();
+      sum.squares += w * at.residual[i] * at.residual[i];
+    }
+    ++sum.used;
+  }
+  sum.information.template triangularView<Eigen::StrictlyUpper>() = sum.information.transpose();
+  return sum;
+}
+
+double CurvedSpace::squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
+  double sum = 0;
+  Linear at;
+  for (std::size_t k = 0; k < support.index.size(); ++k) {
+    if (!linearise(points, support.index[k], theta, at)) return std::numeric_limits<double>::infinity();
+    for (int i = 0; i < components(); ++i) sum += support.weight[k] * at.residual[i] * at.residual[i];
+  }
+  return sum;
+}
+
+bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, Position& theta) const {
+  const auto least = static_cast<std::size_t>((freedom() + components() - 1) / components());
+  if (support.index.size() < least) return false;
+  Position best = theta;
+  double damping = 1e-6;
+  bool moved = false;
+  for (int step = 0; step < kSteps; ++step) {
+    const Equations at = equations(points, support, best);
+    if (at.used < least || !at.information.allFinite()) break;
+    bool better = false;
+    for (int attempt = 0; attempt < kHalvings && !better; ++attempt, damping *= 100) {
+      Normal damped = at.information;
+      damped.diagonal() *= 1 + damping;
+      const Eigen::LDLT<Normal> solver(damped);
+      if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > kLeastRank * solver.vectorD().maxCoeff())) return moved;
+      const Eigen::VectorXd by = solver.solve(-at.gradient);
+      Position candidate = retract(best, by);
+      if (!candidate.allFinite() || !admit(candidate)) continue;
+      const double now = squares(points, support, candidate);
+      if (!(now < at.squares)) continue;
+      better = moved = true;
+      best = candidate;
+      damping = std::max(damping * 1e-3, 1e-9);
+      if (at.squares - now < kSettled * at.squares) step = kSteps;
+      break;
+    }
+    if (!better) break;
+  }
+  // Where no step helped, the position is the minimum already.
+  theta = best;
+  return theta.allFinite();
+}
+
+Eigen::MatrixXd CurvedSpace::unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
+  const Equations at = equations(points, support, theta);
+  const Basis chart = basis(theta);
+  const Eigen::MatrixXd information = at.information;
+  return chart * information.completeOrthogonalDecomposition().pseudoInverse() * chart.transpose();
+}
+
+double CurvedSpace::noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double) const {
+  const double degrees = static_cast<double>(support.index.size()) * components() - freedom();
+  return squares(points, support, theta) / std::max(1.0, degrees);
+}
+
+Eigen::MatrixXd CurvedSpace::covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const {
+  // to_data is smooth and well scaled in the working frame: central differences lose nothing that a covariance would show.
+  constexpr double kStep = 1e-5;
+  const int n = parameter_count();
+  const Eigen::VectorXd here = to_data(theta, frame);
+  Eigen::MatrixXd jacobian(n, n);
+  for (int i = 0; i < n; ++i) {
+    Position ahead = theta, behind = theta;
+    ahead[i] += kStep;
+    behind[i] -= kStep;
+    Eigen::VectorXd a = to_data(ahead, frame), b = to_data(behind, frame);
+    jacobian.col(i) = (a - b) / (2 * kStep);
+  }
+  return jacobian * covariance * jacobian.transpose();
+}
+
+}  // namespace swarmfit::models

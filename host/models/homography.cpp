@@ -1,0 +1,122 @@
+#include "host/models/projective.hpp"
+
+namespace swarmfit::models {
+namespace {
+
+/// Twice the signed area of a triangle.
+double turn(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/// The matrix that takes the four corners of the projective basis to these points, whatever the scale; false where three are collinear.
+bool from_basis(const Eigen::Matrix<double, 3, 4>& p, Eigen::Matrix3d& a) {
+  const Eigen::Matrix3d corners = p.leftCols<3>();
+  const double area = std::abs(corners.determinant());
+  const double size = (p.rowwise().maxCoeff() - p.rowwise().minCoeff()).squaredNorm();
+  if (!(area > 1e-3 * size)) return false;
+  const Eigen::Vector3d share = corners.inverse() * p.col(3);
+  if (!(share.cwiseAbs().minCoeff() > 1e-3)) return false;
+  a = corners * share.asDiagonal();
+  return true;
+}
+
+class Homography final : public Projective {
+ public:
+  ModelType type() const noexcept override { return ModelType::homography; }
+  kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::homography; }
+  int minimal_sample() const noexcept override { return 4; }
+  int freedom() const noexcept override { return 8; }
+
+  /// Four correspondences, each image moved to its sample's own centre and size first (Hartley), so that the solution is sound.
+  bool from_sample(const WorkingPoints& points, std::span<const std::uint32_t> sample, Position& theta) const override {
+    Eigen::Matrix<double, 3, 4> a, b;
+    for (int i = 0; i < 4; ++i) {
+      const Eigen::Vector4d p = points.point<4>(sample[static_cast<std::size_t>(i)]);
+      a.col(i) = first(p);
+      b.col(i) = second(p);
+    }
+    if (!same_turns(a, b)) return false;
+    Eigen::Matrix3d ta, tb, basis_a, basis_b;
+    if (!normalise(a, ta) || !normalise(b, tb) || !from_basis(a, basis_a) || !from_basis(b, basis_b)) return false;
+    const Matrix m = tb.inverse() * (basis_b * basis_a.inverse()) * ta;
+    theta = position(m);
+    return admit(theta);
+  }
+
+  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
+    return position(to_image(frame, 1) * matrix(theta) * from_image(frame, 0));
+  }
+  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+    return position(from_image(frame, 1) * matrix(parameters) * to_image(frame, 0));
+  }
+
+  bool admit(Position& theta) const override {
+    if (!theta.allFinite()) return false;
+    // Orientation is kept and nothing is flattened; the sign is that of points in front of both cameras.
+    const double determinant = matrix(theta).determinant();
+    if (!(std::abs(determinant) > 1e-7)) return false;
+    if (theta[8] < 0) theta = -theta;
+    return true;
+  }
+
+ protected:
+  int components() const noexcept override { return 2; }
+
+  /// Sampson's error: c(x, H) = (u - x', v - y') with (u, v) = H x, divided by the root of its covariance under unit noise in all columns.
+  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const override {
+    const Eigen::Vector4d p = points.point<4>(point);
+    const Matrix m = matrix(theta);
+    const Eigen::Vector3d x = first(p), y = m * x;
+    if (!(std::abs(y[2]) > 1e-12)) return false;
+    const Eigen::Vector2d image(y[0] / y[2], y[1] / y[2]);
+    Eigen::Matrix2d along;  // of the image by the point
+    along << m(0, 0) - image[0] * m(2, 0), m(0, 1) - image[0] * m(2, 1), m(1, 0) - image[1] * m(2, 0), m(1, 1) - image[1] * m(2, 1);
+    along /= y[2];
+    const Eigen::Matrix2d covariance = along * along.transpose() + Eigen::Matrix2d::Identity();
+    const Eigen::LLT<Eigen::Matrix2d> root(covariance);
+    at.residual = root.matrixL().solve(Eigen::Vector2d(image - p.tail<2>()));
+    Eigen::Matrix<double, 2, 9> by;
+    by << x.transpose(), Eigen::RowVector3d::Zero(), -image[0] * x.transpose(),  //
+        Eigen::RowVector3d::Zero(), x.transpose(), -image[1] * x.transpose();
+    by /= y[2];
+    at.by_parameter = root.matrixL().solve(by);
+    return at.residual.allFinite();
+  }
+
+  /// The tangent space of the unit sphere: what the Householder reflection that takes theta to an axis leaves.
+  Basis basis(const Position& theta) const override {
+    Vector9 u = theta;
+    u[0] += theta[0] < 0 ? -1 : 1;
+    const Eigen::Matrix<double, 9, 9> reflection = Eigen::Matrix<double, 9, 9>::Identity() - u * u.transpose() * (2 / u.squaredNorm());
+    return reflection.rightCols<8>();
+  }
+  Position retract(const Position& theta, const Eigen::VectorXd& step) const override {
+    Position moved = theta + basis(theta) * step;
+    moved.normalize();
+    return moved;
+  }
+
+ private:
+  /// A view of a plane from its one side never turns a triangle over: of the four triangles all or none may change sign together.
+  static bool same_turns(const Eigen::Matrix<double, 3, 4>& a, const Eigen::Matrix<double, 3, 4>& b) {
+    static constexpr int kTriangles[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};
+    int same = 0;
+    for (const auto& t : kTriangles) same += turn(a.col(t[0]), a.col(t[1]), a.col(t[2])) * turn(b.col(t[0]), b.col(t[1]), b.col(t[2])) > 0;
+    return same == 0 || same == 4;
+  }
+
+  static bool normalise(Eigen::Matrix<double, 3, 4>& p, Eigen::Matrix3d& t) {
+    const Eigen::Vector3d mean = p.rowwise().mean();
+    const double size = std::sqrt((p.colwise() - mean).colwise().squaredNorm().mean());
+    if (!(size > 1e-9)) return false;
+    t << 1 / size, 0, -mean[0] / size, 0, 1 / size, -mean[1] / size, 0, 0, 1;
+    p = t * p;
+    return true;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<ModelSpace> make_homography_space(const std::optional<DirectionPrior>&) { return std::make_unique<Homography>(); }
+
+}  // namespace swarmfit::models

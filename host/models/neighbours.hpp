@@ -1,0 +1,35 @@
+// Who lies next to whom: the nearest neighbours of points, for samples, normals and smooth labels.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "host/models/working_points.hpp"
+
+namespace swarmfit::models {
+
+/// The nearest others of each of `candidates` among them, by a kd-tree over all columns of the working frame. Ties go to the lower place.
+class Neighbours {
+ public:
+  Neighbours() = default;
+  /// `candidates`: input indices of finite points. `count`: neighbours a point, fewer where there are fewer candidates.
+  Neighbours(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count);
+
+  bool empty() const noexcept { return nearest_.empty(); }
+  std::size_t count() const noexcept { return count_; }
+  /// Places in `candidates` of the neighbours of the one at `place`, nearest first.
+  std::span<const std::uint32_t> of(std::size_t place) const noexcept { return std::span(nearest_).subspan(place * count_, count_); }
+
+ private:
+  std::size_t count_ = 0;
+  std::vector<std::uint32_t> nearest_;
+};
+
+/// Unit normals of points in space: of the plane through each candidate and its neighbours. `normals` has an entry for every point of the
+/// cloud; candidates whose neighbourhood has no one plane, and all others, keep zero.
+void estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates, const Neighbours& neighbours,
+                      std::vector<Eigen::Vector3f>& normals);
+
+}  // namespace swarmfit::models

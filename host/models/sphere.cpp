@@ -1,0 +1,16 @@
+#include "host/models/round.hpp"
+
+namespace swarmfit::models {
+namespace {
+
+class Sphere final : public Round<3> {
+ public:
+  ModelType type() const noexcept override { return ModelType::sphere; }
+  kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::sphere; }
+};
+
+}  // namespace
+
+std::unique_ptr<ModelSpace> make_sphere_space(const std::optional<DirectionPrior>&) { return std::make_unique<Sphere>(); }
+
+}  // namespace swarmfit::models
