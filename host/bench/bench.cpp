@@ -227,11 +227,14 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
         return fail(Error::Kind::bad_input,
                     fmt::format("points have {} columns, must have {} to bench a {}", cloud->dimension(), dimension(type), name(type)));
       }
-      if (auto done = run_cloud(runner, options, type, *cloud, backends); !done) return tl::unexpected(done.error());
+      auto done = run_cloud(runner, options, type, *cloud, backends);
+      // A cloud need not determine every kind of its dimension; only those that were asked for by name must be there.
+      const bool undetermined = !done && done.error().kind == Error::Kind::bad_input && options.models.empty();
+      if (!done && !undetermined) return tl::unexpected(done.error());
       continue;
     }
     for (const std::size_t count : options.points) {
-      const std::vector<float> values = bench_internal::synthetic_points(dimension(type), count, options.seed);
+      const std::vector<float> values = bench_internal::synthetic_points(type, count, options.seed);
       const PointsView points(std::span<const float>(values), dimension(type));
       if (auto done = run_cloud(runner, options, type, points, backends); !done) return tl::unexpected(done.error());
     }

@@ -21,7 +21,6 @@ namespace swarmfit::bench_internal {
 namespace {
 
 constexpr int kSteps = 10;
-constexpr double kSyntheticSpread = 0.003;
 constexpr double kThreshold = 0.01;  // of a plane by default, and three times the spread above
 
 /// Passes everything on and keeps a copy of each swarm it is asked about.
@@ -86,33 +85,6 @@ Expected<> add_reference(Case& made) {
 }
 
 }  // namespace
-
-std::vector<float> synthetic_points(int dimension, std::size_t count, std::uint64_t seed) {
-  constexpr std::size_t kFlats = 4;
-  std::mt19937_64 engine(seed);
-  const auto uniform = [&] { return static_cast<double>(engine() >> 11) * 0x1p-52 - 1.0; };
-  const auto width = static_cast<std::size_t>(dimension);
-  std::vector<Eigen::VectorXd> normals;
-  for (std::size_t k = 0; k < kFlats; ++k) {
-    Eigen::VectorXd normal(dimension);
-    for (Eigen::Index c = 0; c < dimension; ++c) normal[c] = uniform();
-    normals.push_back(normal.norm() > 0.1 ? Eigen::VectorXd(normal.normalized()) : Eigen::VectorXd::Unit(dimension, 0));
-  }
-  std::vector<float> values(count * width);
-  Eigen::VectorXd x(dimension);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (Eigen::Index c = 0; c < dimension; ++c) x[c] = uniform();
-    if (i % 10 < 6) {
-      const Eigen::VectorXd& normal = normals[i % kFlats];
-      const double offset = 0.2 * static_cast<double>(i % kFlats);
-      // Irwin-Hall: three uniform numbers make a bell, and the same one on every standard library.
-      const double noise = kSyntheticSpread * (uniform() + uniform() + uniform());
-      x += (noise + offset - normal.dot(x)) * normal;
-    }
-    for (std::size_t c = 0; c < width; ++c) values[i * width + c] = static_cast<float>(x[static_cast<Eigen::Index>(c)]);
-  }
-  return values;
-}
 
 Expected<Case> make_case(ModelType type, const PointsView& points, std::size_t particles, std::uint64_t seed, int threads) {
   models::WorkingPoints working(points);

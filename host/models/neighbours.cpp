@@ -53,7 +53,7 @@ Neighbours::Neighbours(const WorkingPoints& points, std::span<const std::uint32_
 
 void estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates, const Neighbours& neighbours,
                       std::vector<Eigen::Vector3f>& normals) {
-  constexpr double kFlat = 0.2;  // of the next larger spread: above, the neighbourhood is no surface
+  constexpr double kFlat = 0.5;  // of the next larger spread: above, the neighbourhood is no surface
   normals.assign(points.size(), Eigen::Vector3f::Zero());
   if (neighbours.empty()) return;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
