@@ -90,7 +90,9 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   Settings s = preset(options.preset);
   s.particles = options.particles.value_or(s.particles);
   s.iterations = options.iterations.value_or(s.iterations);
-  s.stall = options.stall.value_or(s.stall);
+  // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
+  constexpr int kStallOnPart = 5;
+  s.stall = options.stall.value_or(s.searches_part(finite_points) ? kStallOnPart : s.stall);
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -32,9 +34,10 @@ bool read_row(const PointsView& points, std::size_t row, Pivot& x) {
   return probe == 0;
 }
 
-/// A place among the strip's points: the median, a column, of three of them, so that a stray does not cost the others their precision.
+/// A place among the strip's points: the median, a column, of three of them, so that a stray does not cost the others their precision. False
+/// if none of the rows looked at is finite.
 template <class S>
-Pivot choose_pivot(const PointsView& points, std::size_t first, std::size_t count) {
+bool choose_pivot(const PointsView& points, std::size_t first, std::size_t count, Pivot& pivot) {
   constexpr std::size_t kAsked = 3, kProbes = 16;
   std::array<Pivot, kAsked> found{};
   std::size_t known = 0;
@@ -43,14 +46,11 @@ Pivot choose_pivot(const PointsView& points, std::size_t first, std::size_t coun
     const std::size_t row = probe < kAsked ? probe * (count - 1) / (kAsked - 1) : probe * count / kProbes;
     known += read_row<S>(points, first + row, found[known]) ? 1 : 0;
   }
-  for (std::size_t row = 0; known == 0 && row < count; ++row) known += read_row<S>(points, first + row, found[0]) ? 1 : 0;
-  if (known == 0) return {};
-  if (known < kAsked) return found[0];
-  Pivot pivot{};
-  for (std::size_t d = 0; d < kMaxDimension; ++d) {
+  pivot = known > 0 ? found[0] : Pivot{};
+  for (std::size_t d = 0; known == kAsked && d < kMaxDimension; ++d) {
     pivot[d] = std::max(std::min(found[0][d], found[1][d]), std::min(std::max(found[0][d], found[1][d]), found[2][d]));
   }
-  return pivot;
+  return known > 0;
 }
 
 /// What a task needs to work on one strip after another.
@@ -62,29 +62,12 @@ struct Bench {
   std::size_t first = 0, count = 0;
   std::vector<std::size_t> claimants;  ///< models that some point was given to
 
-  /// Strip number `index` of the points; those that are finite get `limit`, or their cap where there are any.
-  void load(const CpuKernels& kernels, const PointsView& points, std::size_t index, float limit, std::span<const float> all_caps = {}) {
+  /// Strip number `index` of the points; those that are finite get `limit`, or their cap where there are any. False if none is finite.
+  bool load(const CpuKernels& kernels, const PointsView& points, std::size_t index, float limit, std::span<const float> caps = {}) {
     first = index * kStripPoints;
     count = std::min(kStripPoints, points.count - first);
-    const float* const caps = all_caps.empty() ? nullptr : all_caps.data() + first;
-    const auto width = static_cast<std::size_t>(points.dimension);
-    const char* from = static_cast<const char*>(points.data) + first * points.stride;
-    std::array<float, kMaxDimension> origin{};
-    if (points.scalar == Scalar::float32) {
-      pivot = choose_pivot<float>(points, first, count);
-      for (std::size_t d = 0; d < width; ++d) origin[d] = static_cast<float>(pivot[d]);
-      const bool tight = points.stride == width * sizeof(float) && reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0;
-      if (tight) return kernels.split(reinterpret_cast<const float*>(from), width, count, origin.data(), limit, caps, strip, finite.data());
-      for (std::size_t i = 0; i < count; ++i, from += points.stride) std::memcpy(rows.data() + i * width, from, width * sizeof(float));
-    } else {
-      pivot = choose_pivot<double>(points, first, count);
-      for (std::size_t i = 0; i < count; ++i, from += points.stride) {
-        std::array<double, kMaxDimension> row;
-        std::memcpy(row.data(), from, width * sizeof(double));
-        for (std::size_t d = 0; d < width; ++d) rows[i * width + d] = narrow(row[d] - pivot[d]);
-      }
-    }
-    kernels.split(rows.data(), width, count, origin.data(), limit, caps, strip, finite.data());
+    if (!caps.empty()) caps = caps.subspan(first, count);
+    return points.scalar == Scalar::float32 ? load_as<float>(kernels, points, limit, caps) : load_as<double>(kernels, points, limit, caps);
   }
 
   /// The sums' moments in the points' frame.
@@ -130,6 +113,43 @@ struct Bench {
   }
 
  private:
+  template <class S>
+  bool load_as(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
+    const bool chosen = choose_pivot<S>(points, first, count, pivot);
+    split<S>(kernels, points, limit, caps);
+    const auto word = std::find_if(finite.begin(), finite.end(), [](std::uint64_t bits) { return bits != 0; });
+    if (word == finite.end()) return false;
+    if (!chosen) {
+      read_row<S>(points, first + static_cast<std::size_t>(word - finite.begin()) * 64 + static_cast<std::size_t>(std::countr_zero(*word)),
+                  pivot);
+      split<S>(kernels, points, limit, caps);
+    }
+    return true;
+  }
+
+  template <class S>
+  void split(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
+    const auto width = static_cast<std::size_t>(points.dimension);
+    const char* from = static_cast<const char*>(points.data) + first * points.stride;
+    std::array<float, kMaxDimension> origin{};
+    const float* tight = rows.data();
+    if constexpr (std::is_same_v<S, float>) {
+      for (std::size_t d = 0; d < width; ++d) origin[d] = static_cast<float>(pivot[d]);
+      if (points.stride == width * sizeof(float) && reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0) {
+        tight = reinterpret_cast<const float*>(from);
+      } else {
+        for (std::size_t i = 0; i < count; ++i, from += points.stride) std::memcpy(rows.data() + i * width, from, width * sizeof(float));
+      }
+    } else {
+      for (std::size_t i = 0; i < count; ++i, from += points.stride) {
+        std::array<double, kMaxDimension> row;
+        std::memcpy(row.data(), from, width * sizeof(double));
+        for (std::size_t d = 0; d < width; ++d) rows[i * width + d] = narrow(row[d] - pivot[d]);
+      }
+    }
+    kernels.split(tight, width, count, origin.data(), limit, caps.empty() ? nullptr : caps.data(), strip, finite.data());
+  }
+
   /// To float; finite stays finite.
   static float narrow(double v) {
     constexpr double kMost = std::numeric_limits<float>::max();
@@ -154,10 +174,11 @@ void PointPasses::survey(const PointsView& points, Survey& survey) {
   survey.finite.resize((points.count + 63) / 64);
   evidence_.assign(run_count(points), {});
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    bench.load(kernels_, points, strip, 0);
-    StripSums sums;
-    kernels_.sum_all(bench.strip, static_cast<std::size_t>(points.dimension), sums);
-    bench.add(sums, evidence_[run]);
+    if (bench.load(kernels_, points, strip, 0)) {
+      StripSums sums;
+      kernels_.sum_all(bench.strip, static_cast<std::size_t>(points.dimension), sums);
+      bench.add(sums, evidence_[run]);
+    }
     std::copy_n(bench.finite.begin(), (bench.count + 63) / 64, survey.finite.begin() + static_cast<std::ptrdiff_t>(strip * kWords));
   });
   std::array<Evidence, 1> all;
@@ -171,7 +192,8 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
   const std::size_t runs = run_count(points);
   evidence_.assign(runs * models.size(), {});
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    bench.load(kernels_, points, strip, how.tolerance, how.caps);
+    const bool any = bench.load(kernels_, points, strip, how.tolerance, how.caps);
+    if (!any && distances.empty()) return;
     for (std::size_t m = 0; m < models.size(); ++m) {
       std::array<float, kMaxCoefficients> coefficients{};
       alignas(64) std::array<float, kStripPoints> told;
@@ -196,7 +218,10 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
   const float beyond = std::nextafter(tolerance, std::numeric_limits<float>::infinity());
   evidence_.assign(runs * models.size(), {});
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    bench.load(kernels_, points, strip, tolerance);
+    if (!bench.load(kernels_, points, strip, tolerance)) {
+      std::fill_n(labels.begin() + static_cast<std::ptrdiff_t>(bench.first), bench.count, std::uint16_t{0});
+      return;
+    }
     alignas(64) std::array<float, kStripPoints> nearest, told;
     alignas(64) std::array<std::int32_t, kStripPoints> label;
     label.fill(0);
@@ -210,9 +235,9 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
         of_run[m].cost += bench.be_nowhere(told);
         continue;
       }
-      const bool any = kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1), nearest.data(),
-                                      label.data(), of_run[m].cost);
-      if (any) bench.claimants.push_back(m);
+      const bool claimed = kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1),
+                                          nearest.data(), label.data(), of_run[m].cost);
+      if (claimed) bench.claimants.push_back(m);
     }
     for (std::size_t i = 0; i < bench.count; ++i) labels[bench.first + i] = static_cast<std::uint16_t>(label[i]);
     for (const std::size_t m : bench.claimants) {
