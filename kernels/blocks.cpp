@@ -211,6 +211,14 @@ void bound_axis(const Centred& centred, const std::array<float, 3>& axis, double
   bounds.sign_sum[e] = signs;
 }
 
+float box_radius(const BlockBounds& bounds, std::size_t width) {
+  double square = 0;
+  for (std::size_t e = 0; e < width; ++e) {
+    for (std::size_t c = 0; c < width; ++c) square += static_cast<double>(bounds.axis[e][c]) * static_cast<double>(bounds.axis[e][c]);
+  }
+  return static_cast<float>(std::sqrt(square) * (1 + 1e-5));
+}
+
 }  // namespace
 
 BlockBounds bound_block(const float* const* columns, const float* caps, int dimension) {
@@ -228,11 +236,14 @@ BlockBounds bound_block(const float* const* columns, const float* caps, int dime
   }
   diagonalise(covariance, axes, dimension);
   // What the sums above and the axes' own rounding may have added to the variance in any direction; it may well make one negative.
-  const double rounding = 4.0 * static_cast<double>(kSumRounding) * (covariance[0][0] + covariance[1][1] + covariance[2][2]);
+  const double trace = covariance[0][0] + covariance[1][1] + covariance[2][2];
+  const double rounding = 4.0 * static_cast<double>(kSumRounding) * trace;
   for (std::size_t e = 0; e < width; ++e) {
     const std::array<float, 3> axis{static_cast<float>(axes[0][e]), static_cast<float>(axes[1][e]), static_cast<float>(axes[2][e])};
     bound_axis(centred, axis, covariance[e][e] - rounding, width, e, bounds);
   }
+  bounds.mean_square = static_cast<float>(trace + rounding);
+  bounds.radius = box_radius(bounds, width);
   return bounds;
 }
 

@@ -34,6 +34,8 @@ struct BlockBounds {
   float mean[3] = {};
   float axis[3][3] = {};  ///< principal axes, each as long as the box's half extent about the mean
   float spread[3] = {};   ///< variance along the axis, less its rounding, over the square of its length
+  float radius = 0;       ///< of a ball about the mean that holds the box
+  float mean_square = 0;  ///< of the points' distances from the mean, and its rounding
   float least_cap = 0;    ///< of caps > 0
   float most_cap = -std::numeric_limits<float>::infinity();
   float cap_sum = 0;

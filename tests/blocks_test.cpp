@@ -1,6 +1,8 @@
 // Pruning changes nothing: with it, a cost below its cutoff is the same bytes as without, and any other lies between cutoff and truth.
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -30,11 +32,57 @@ struct Scene {
   }
 };
 
-/// Flat patches of all sizes with noise, clutter, duplicates, points that are not finite; caps of several shapes; models near the patches,
-/// far from them, and anywhere.
+using Uniform = std::function<double(double, double)>;
+
+bool is_flat(ModelKind kind) { return traits(kind).affine; }
+
+void normalise(double* v, std::size_t width) {
+  double square = 0;
+  for (std::size_t c = 0; c < width; ++c) square += v[c] * v[c];
+  for (std::size_t c = 0; c < width; ++c) v[c] /= std::sqrt(square) + 1e-12;
+}
+
+/// A surface through the cube of half width 2 about (origin, origin, ...); where it is round, of any size from a pea's to nearly flat.
+std::vector<double> random_surface(ModelKind kind, double origin, const Uniform& uniform) {
+  const auto width = static_cast<std::size_t>(traits(kind).dimension);
+  std::vector<double> p(static_cast<std::size_t>(traits(kind).parameter_count));
+  for (double& v : p) v = uniform(-1, 1);
+  if (is_flat(kind)) {
+    normalise(p.data(), width);
+    for (std::size_t c = 0; c < width; ++c) p[width] -= p[c] * origin;
+    return p;
+  }
+  if (kind == ModelKind::cylinder) normalise(p.data() + 3, 3);
+  const double radius = p.back() = std::pow(10.0, uniform(-1.5, 2));
+  for (std::size_t c = 0; c < width; ++c) p[c] = origin + p[c] * std::max(1.0, radius);
+  return p;
+}
+
+/// To where x is `off` from the surface, along the normal.
+void pull(ModelKind kind, const std::vector<double>& p, double off, std::vector<double>& x) {
+  const std::size_t width = x.size();
+  double distance = -off;
+  std::vector<double> normal(width);
+  if (is_flat(kind)) {
+    distance += p[width];
+    for (std::size_t c = 0; c < width; ++c) distance += (normal[c] = p[c]) * x[c];
+  } else {
+    double along = 0, length = 0;
+    for (std::size_t c = 0; c < width; ++c) normal[c] = x[c] - p[c];
+    for (std::size_t c = 0; kind == ModelKind::cylinder && c < 3; ++c) along += normal[c] * p[3 + c];
+    for (std::size_t c = 0; kind == ModelKind::cylinder && c < 3; ++c) normal[c] -= along * p[3 + c];
+    for (const double v : normal) length = std::hypot(length, v);
+    for (double& v : normal) v /= length;
+    distance += length - p.back();
+  }
+  for (std::size_t c = 0; c < width; ++c) x[c] -= distance * normal[c];
+}
+
+/// Patches of surfaces of all sizes with noise, clutter, duplicates, points that are not finite; caps of several shapes; models near the
+/// patches, far from them, and anywhere.
 Scene random_scene(ModelKind kind, unsigned seed, std::size_t count, std::size_t particles) {
   std::mt19937 engine(seed);
-  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine); };
+  const Uniform uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine); };
   Scene scene;
   scene.kind = kind;
   scene.particles = particles;
@@ -42,32 +90,14 @@ Scene random_scene(ModelKind kind, unsigned seed, std::size_t count, std::size_t
   const double origin = seed % 4 == 3 ? 1000.0 : 0.0;
   const double noise = std::pow(10.0, uniform(-5, -1.5));
 
-  std::vector<std::vector<double>> flats;
-  const auto random_flat = [&] {
-    std::vector<double> flat(width + 1);
-    double norm = 0;
-    for (std::size_t c = 0; c < width; ++c) {
-      flat[c] = uniform(-1, 1);
-      norm += flat[c] * flat[c];
-    }
-    norm = std::sqrt(norm) + 1e-12;
-    for (std::size_t c = 0; c < width; ++c) flat[c] /= norm;
-    flat[width] = uniform(-1, 1);
-    for (std::size_t c = 0; c < width; ++c) flat[width] -= flat[c] * origin;
-    return flat;
-  };
-  for (int k = 0; k < 4; ++k) flats.push_back(random_flat());
+  std::vector<std::vector<double>> surfaces;
+  for (int k = 0; k < 4; ++k) surfaces.push_back(random_surface(kind, origin, uniform));
 
   const double clutter = uniform(0, 0.6);
   for (std::size_t i = 0; i < count; ++i) {
     std::vector<double> x(width);
     for (double& v : x) v = origin + uniform(-2, 2);
-    if (uniform(0, 1) > clutter) {
-      const std::vector<double>& flat = flats[seed % 3 == 0 ? 0 : i % flats.size()];
-      double d = flat[width] + uniform(-noise, noise);
-      for (std::size_t c = 0; c < width; ++c) d += flat[c] * x[c];
-      for (std::size_t c = 0; c < width; ++c) x[c] -= flat[c] * d;
-    }
+    if (uniform(0, 1) > clutter) pull(kind, surfaces[seed % 3 == 0 ? 0 : i % surfaces.size()], uniform(-noise, noise), x);
     if (uniform(0, 1) < 0.01) x[0] = std::numeric_limits<double>::quiet_NaN();
     for (const double v : x) scene.points.push_back(static_cast<float>(v));
   }
@@ -84,7 +114,7 @@ Scene random_scene(ModelKind kind, unsigned seed, std::size_t count, std::size_t
     scene.caps.push_back(static_cast<float>(cap));
   }
   for (std::size_t j = 0; j < particles; ++j) {
-    std::vector<double> model = j % 3 == 0 ? random_flat() : flats[j % flats.size()];
+    std::vector<double> model = j % 3 == 0 ? random_surface(kind, origin, uniform) : surfaces[j % surfaces.size()];
     const double shake = j % 3 == 2 ? std::pow(10.0, uniform(-5, -1)) : 0;
     for (double& v : model) v += shake * uniform(-1, 1);
     scene.swarm.insert(scene.swarm.end(), model.begin(), model.end());
@@ -112,6 +142,12 @@ std::vector<float> costs_of(FitnessEvaluator& evaluator, const Scene& scene, Los
 void load(FitnessEvaluator& evaluator, const Scene& scene) {
   ASSERT_TRUE(evaluator.set_points(scene.view()));
   ASSERT_TRUE(evaluator.set_caps(scene.caps));
+}
+
+std::vector<ModelKind> bounded_kinds() {
+  std::vector<ModelKind> kinds(std::begin(kModelKinds), std::end(kModelKinds));
+  std::erase_if(kinds, [](ModelKind kind) { return !traits(kind).bounded; });
+  return kinds;
 }
 
 class Pruning : public testing::TestWithParam<std::tuple<ModelKind, Loss>> {};
@@ -170,8 +206,7 @@ TEST_P(Pruning, SameBytesOnAnyThreadsAndEachInstructionSet) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, Pruning,
-                         testing::Combine(testing::Values(ModelKind::line2d, ModelKind::plane),
-                                          testing::Values(Loss::truncated_l1, Loss::truncated_l2)));
+                         testing::Combine(testing::ValuesIn(bounded_kinds()), testing::Values(Loss::truncated_l1, Loss::truncated_l2)));
 
 TEST(PruningEdges, ModelsThatAreNotFiniteCostInfinity) {
   Scene scene = random_scene(ModelKind::plane, 3, 20000, 64);

@@ -31,19 +31,21 @@ using Vector = hn::Vec<FloatTag>;
 constexpr std::size_t lanes() { return HWY_LANES(float); }
 
 /// What models.inl computes with.
-struct VectorMath {
-  static HWY_INLINE Vector add(Vector a, Vector b) { return hn::Add(a, b); }
-  static HWY_INLINE Vector sub(Vector a, Vector b) { return hn::Sub(a, b); }
-  static HWY_INLINE Vector mul(Vector a, Vector b) { return hn::Mul(a, b); }
-  static HWY_INLINE Vector div(Vector a, Vector b) { return hn::Div(a, b); }
-  static HWY_INLINE Vector sqrt(Vector a) { return hn::Sqrt(a); }
-  static HWY_INLINE Vector mul_add(Vector a, Vector b, Vector c) { return hn::MulAdd(a, b, c); }
-  static HWY_INLINE Vector neg_mul_add(Vector a, Vector b, Vector c) { return hn::NegMulAdd(a, b, c); }
-  static HWY_INLINE Vector ratio(Vector a, Vector b) {
-    const FloatTag d;
-    return hn::IfThenElse(hn::Gt(b, hn::Zero(d)), hn::Div(a, b), hn::Inf(d));
-  }
+template <class Tag>
+struct MathOn {
+  using V = hn::Vec<Tag>;
+  static HWY_INLINE V set(double value) { return hn::Set(Tag(), static_cast<float>(value)); }
+  static HWY_INLINE V add(V a, V b) { return hn::Add(a, b); }
+  static HWY_INLINE V sub(V a, V b) { return hn::Sub(a, b); }
+  static HWY_INLINE V mul(V a, V b) { return hn::Mul(a, b); }
+  static HWY_INLINE V div(V a, V b) { return hn::Div(a, b); }
+  static HWY_INLINE V max(V a, V b) { return hn::Max(a, b); }
+  static HWY_INLINE V sqrt(V a) { return hn::Sqrt(a); }
+  static HWY_INLINE V mul_add(V a, V b, V c) { return hn::MulAdd(a, b, c); }
+  static HWY_INLINE V neg_mul_add(V a, V b, V c) { return hn::NegMulAdd(a, b, c); }
+  static HWY_INLINE V ratio(V a, V b) { return hn::IfThenElse(hn::Gt(b, hn::Zero(Tag())), hn::Div(a, b), hn::Inf(Tag())); }
 };
+using VectorMath = MathOn<FloatTag>;
 
 /// The lesser of a magnitude and a limit >= 0, or the limit where the magnitude is NaN.
 HWY_INLINE Vector least(Vector magnitude, Vector limit) {
@@ -69,7 +71,7 @@ HWY_INLINE Vector loss_of(Vector distance, Vector limit) {
 /// Lane sums of one block for `P` models held in registers. Two accumulators a model hide the addition's latency; their order is part
 /// of the answer and the same for every P.
 template <class Model, Loss loss, int P>
-HWY_INLINE void block_sums(const TileView& tile, std::size_t first, const float* const* coefficients, Vector* total) {
+HWY_NOINLINE void block_sums(const TileView& tile, std::size_t first, const float* const* coefficients, Vector* total) {
   constexpr int D = Model::traits.dimension;
   constexpr int C = Model::traits.coefficient_count;
   constexpr std::size_t L = lanes();
@@ -116,8 +118,12 @@ struct FloatSums {
   }
 };
 
-/// Models per register tile: with fewer registers, fewer.
-constexpr std::size_t models_at_once() { return HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL ? 4 : 2; }
+/// Models per register tile: with fewer registers, fewer; one where a residual keeps the processor busy by itself.
+template <class Model>
+constexpr std::size_t models_at_once() {
+  if (!Model::traits.affine) return 1;
+  return HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL ? 4 : 2;
+}
 
 template <class Model, Loss loss, class Sums, int P>
 HWY_INLINE void add_block(const TileView& tile, std::size_t block, Vector scale, const float* const* coefficients,
@@ -131,7 +137,7 @@ HWY_INLINE void add_block(const TileView& tile, std::size_t block, Vector scale,
 template <class Model, Loss loss, class Sums>
 HWY_INLINE void add_listed(const TileView& tile, std::size_t block, Vector scale, const float* const* coefficients,
                            typename Sums::Lane* const* sums, std::size_t models) {
-  constexpr std::size_t P = models_at_once();
+  constexpr std::size_t P = models_at_once<Model>();
   std::size_t j = 0;
   for (; j + P <= models; j += P) add_block<Model, loss, Sums, P>(tile, block, scale, coefficients + j, sums + j);
   for (; j < models; ++j) add_block<Model, loss, Sums, 1>(tile, block, scale, coefficients + j, sums + j);
@@ -241,7 +247,8 @@ using BlockTag = hn::CappedTag<float, kTileBlocks>;
 using BlockVector = hn::Vec<BlockTag>;
 
 /// The lower bound of a block's cost, of blocks side by side; see BlockBounds for the fields. With dmax the largest |d| that the box
-/// admits, min(|d|, c) >= |d| min(1, c / dmax), and sum |d| is at least |sum s_i d_i| for any signs, and sum d^2 / dmax.
+/// admits, min(|d|, c) >= |d| min(1, c / dmax), and sum |d| is at least |sum s_i d_i| for any signs, and sum d^2 / dmax. A curved surface is
+/// taken for its tangent plane, with its bend for `slack`; farther than from one end of the block to the other no distance can change.
 template <class Model, Loss loss>
 struct BlockBounder {
   static constexpr std::size_t D = Model::traits.dimension;
@@ -264,13 +271,29 @@ struct BlockBounder {
     const BlockTag d;
     const BlockVector zero = hn::Zero(d), one = hn::Set(d, 1.0F);
     const BlockVector count = load(Field::count), least_cap = load(Field::least_cap), most_cap = load(Field::most_cap);
-    const BlockVector middle = hn::Add(dot(k, Field::mean), k[D]);
-    BlockVector reach = slack, variance = zero;
+    BlockVector middle, gradient[D], half_bend = zero;
+    if constexpr (Model::traits.affine) {
+      middle = hn::Add(dot(k, Field::mean), k[D]);
+      for (std::size_t c = 0; c < D; ++c) gradient[c] = k[c];
+    } else {
+      BlockVector mean[D];
+      for (std::size_t c = 0; c < D; ++c) mean[c] = load(Field::mean + c);
+      middle = Model::expand(MathOn<BlockTag>(), mean, k, gradient, half_bend);
+      half_bend = hn::Mul(half_bend, hn::Set(d, 0.5F));
+    }
+    BlockVector reach = zero, variance = zero;
     for (std::size_t e = 0; e < D; ++e) {
-      const BlockVector along = dot(k, Field::axis + 3 * e);
+      const BlockVector along = dot(gradient, Field::axis + 3 * e);
       reach = hn::Add(reach, hn::Abs(along));
       variance = hn::MulAdd(hn::Mul(along, along), load(Field::spread + e), variance);
     }
+    BlockVector mean_slack = slack;
+    if constexpr (!Model::traits.affine) {
+      const BlockVector radius = load(Field::radius);
+      reach = hn::Min(hn::MulAdd(half_bend, hn::Mul(radius, radius), reach), radius);
+      mean_slack = hn::MulAdd(half_bend, load(Field::mean_square), mean_slack);
+    }
+    reach = hn::Add(reach, slack);
     const BlockVector nearest = hn::Max(hn::Sub(hn::Abs(middle), reach), zero);
     const BlockVector farthest = hn::Add(hn::Abs(middle), reach);
     const BlockVector square = hn::Mul(count, hn::MulAdd(middle, middle, variance));
@@ -280,12 +303,12 @@ struct BlockBounder {
     if (loss == Loss::truncated_l1) {
       BlockVector sum = hn::Max(hn::Mul(count, hn::Abs(middle)), hn::Div(square, farthest));
       for (std::size_t s = 0; s < D; ++s) {
-        sum = hn::Max(sum, hn::Abs(hn::MulAdd(load(Field::sign_sum + s), middle, dot(k, Field::signed_offset + 3 * s))));
+        sum = hn::Max(sum, hn::Abs(hn::MulAdd(load(Field::sign_sum + s), middle, dot(gradient, Field::signed_offset + 3 * s))));
       }
-      sum = hn::Mul(hn::NegMulAdd(hn::Add(count, count), slack, sum), share);
+      sum = hn::Mul(hn::NegMulAdd(hn::Add(count, count), mean_slack, sum), share);
       least = hn::Max(sum, hn::Mul(load(Field::cap_sum), cap_share));
     } else {
-      const BlockVector rounding = hn::Mul(hn::Mul(hn::Set(d, 2.0F), hn::Mul(slack, farthest)), count);
+      const BlockVector rounding = hn::Mul(hn::Mul(hn::Set(d, 2.0F), hn::Mul(mean_slack, farthest)), count);
       least = hn::Mul(hn::Sub(square, rounding), hn::Mul(share, share));
     }
     // A thousandth of a percent for the rounding of all the above and of the sums that it is compared with.
@@ -329,7 +352,7 @@ HWY_INLINE void bound_of(const TileBounds& tile, const float* HWY_RESTRICT coeff
 void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models, Open* open,
            PartialBound* bounds) {
   visit_model(kind, [&]<class Model>() HWY_ATTR {
-    if constexpr (Model::traits.affine) {
+    if constexpr (Model::traits.bounded) {
       if (loss == Loss::truncated_l1) return bound_of<Model, Loss::truncated_l1>(tile, coefficients, slack, models, open, bounds);
       return bound_of<Model, Loss::truncated_l2>(tile, coefficients, slack, models, open, bounds);
     }

@@ -45,7 +45,7 @@ struct Summing {
 /// Where the fields of BlockBounds lie in TileBounds.
 struct Field {
   static constexpr std::size_t count = 0, least_cap = 1, most_cap = 2, cap_sum = 3, mean = 4, axis = 7, spread = 16, signed_offset = 19,
-                               sign_sum = 28, all = 31;
+                               sign_sum = 28, radius = 31, mean_square = 32, all = 33;
 };
 
 /// Bounds of a tile's blocks side by side. Blocks that are not there are beyond every model's reach and cost nothing.
@@ -101,7 +101,7 @@ struct CpuKernels {
   /// Quanta of each block of the tile for a model that explains none of its points; exact form only.
   void (*cap_units)(const Summing& summing, const TileView& tile, std::int32_t* units);
 
-  /// Bounds of affine models over a tile. slack[j] is what rounding may do to a distance of model j.
+  /// Bounds of models of a bounded kind over a tile. slack[j] is what rounding may do to a distance of model j.
   void (*bound)(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models,
                 Open* open, PartialBound* bounds);
 

@@ -187,6 +187,8 @@ void pack_bounds(const BlockBounds& block, std::size_t at, TileBounds& tile) {
   tile.field[Field::least_cap][at] = block.least_cap;
   tile.field[Field::most_cap][at] = block.most_cap;
   tile.field[Field::cap_sum][at] = block.cap_sum;
+  tile.field[Field::radius][at] = block.radius;
+  tile.field[Field::mean_square][at] = block.mean_square;
   for (std::size_t c = 0; c < 3; ++c) {
     tile.field[Field::mean + c][at] = block.mean[c];
     tile.field[Field::spread + c][at] = block.spread[c];

@@ -59,7 +59,7 @@ std::uint64_t SwarmCosts::evaluate(PointStore& points, const CentredSwarm& swarm
 }
 
 bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing) {
-  if (!pruning_ || !traits(swarm.kind).affine || summing.scale == 0 || points.finite() * swarm.count < kLeastWork) return false;
+  if (!pruning_ || !traits(swarm.kind).bounded || summing.scale == 0 || points.finite() * swarm.count < kLeastWork) return false;
   if (pause_ > 0) {
     --pause_;
     return false;
@@ -121,14 +121,9 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
 
 void SwarmCosts::bound_all(const PointStore& points, const CentredSwarm& swarm, Loss loss) {
   const std::size_t width = width_of(swarm.kind);
-  const auto dimension = static_cast<std::size_t>(points.dimension());
   slack_.resize(swarm.count);
   for (std::size_t j = 0; j < swarm.count; ++j) {
-    // Of a sum of dimension + 1 products in float, here and in the residuals, and of the blocks' means.
-    constexpr float kRounding = 2e-6F;
-    float size = std::abs(swarm.coefficients[j * width + dimension]);
-    for (std::size_t c = 0; c < dimension; ++c) size += std::abs(swarm.coefficients[j * width + c]) * points.reach()[c];
-    slack_[j] = std::min(kRounding * size, 1e30F) + std::numeric_limits<float>::min();
+    slack_[j] = residual_rounding(swarm.kind, swarm.coefficients.data() + j * width, points.reach().data());
   }
   const Runs runs(points.tiles());
   bounds_.assign(runs.count * swarm.count, {});

@@ -22,17 +22,46 @@ struct Ball {
     k[3 * D] = radius;
   }
 
+  /// Size of the numbers that a residual adds up, twice, as more operations round them than a plane's.
+  static float magnitude(const float* k, const float* reach) {
+    float size = 0;
+    for (int d = 0; d < D; ++d) size += 2 * (std::abs(k[d]) + reach[d]);
+    return size;
+  }
+
   /// Signed orthogonal distance, negative inside. 5 D + 1 multiply-adds, a square root and a division.
   template <class Math, class V>
   static SWARMFIT_INLINE V residual(const Math m, const V* x, const V* k) {
-    V power = m.mul(m.sub(x[0], k[0]), m.sub(x[0], k[D]));
-    V from_centre = m.sub(x[0], k[2 * D]);
-    V square = m.mul(from_centre, from_centre);
+    V out[D];
+    return signed_distance(m, x, k, outward(m, x, k, out));
+  }
+
+  /// The same with its gradient and its bend: s away, it is above the tangent plane by at most bend s^2 / 2, and never below.
+  template <class Math, class V>
+  static SWARMFIT_INLINE V expand(const Math m, const V* x, const V* k, V* gradient, V& bend) {
+    const V length = m.max(outward(m, x, k, gradient), m.set(1e-30));
+    bend = m.div(m.set(1.0), length);
+    for (int d = 0; d < D; ++d) gradient[d] = m.mul(gradient[d], bend);
+    return signed_distance(m, x, k, length);
+  }
+
+ private:
+  /// x - c, and its length.
+  template <class Math, class V>
+  static SWARMFIT_INLINE V outward(const Math m, const V* x, const V* k, V* out) {
+    out[0] = m.sub(x[0], k[2 * D]);
+    V square = m.mul(out[0], out[0]);
     for (int d = 1; d < D; ++d) {
-      power = m.mul_add(m.sub(x[d], k[d]), m.sub(x[d], k[D + d]), power);
-      from_centre = m.sub(x[d], k[2 * D + d]);
-      square = m.mul_add(from_centre, from_centre, square);
+      out[d] = m.sub(x[d], k[2 * D + d]);
+      square = m.mul_add(out[d], out[d], square);
     }
-    return m.div(power, m.add(m.sqrt(square), k[3 * D]));
+    return m.sqrt(square);
+  }
+
+  template <class Math, class V>
+  static SWARMFIT_INLINE V signed_distance(const Math m, const V* x, const V* k, V length) {
+    V power = m.mul(m.sub(x[0], k[0]), m.sub(x[0], k[D]));
+    for (int d = 1; d < D; ++d) power = m.mul_add(m.sub(x[d], k[d]), m.sub(x[d], k[D + d]), power);
+    return m.div(power, m.add(length, k[3 * D]));
   }
 };

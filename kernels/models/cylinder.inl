@@ -1,7 +1,7 @@
 // cylinder: |x - the line through point along axis| = radius. GLSL twin: shaders/models/cylinder.glsl. Included by models.inl only.
 struct Cylinder {
   static constexpr ModelKind kind = ModelKind::cylinder;
-  static constexpr ModelTraits traits{"cylinder", 3, 7, 10, 13 + 2 * kSlowOperation, false};
+  static constexpr ModelTraits traits{"cylinder", 3, 7, 10, 13 + 2 * kSlowOperation, false, true};
 
   /// Two unit vectors across the axis, the first towards it from the origin; then along the first: the near wall, the far wall and the
   /// axis; the radius. In that section the cylinder is a circle, taken as in ball.inl. An axis of length 0 gives NaN.
@@ -31,18 +31,36 @@ struct Cylinder {
     k[9] = radius;
   }
 
+  /// Size of the numbers that a residual adds up, twice, as more operations round them than a plane's.
+  static float magnitude(const float* k, const float* reach) { return 2 * (std::abs(k[6]) + 2 * (reach[0] + reach[1] + reach[2])); }
+
   /// Signed orthogonal distance, negative inside. 13 multiply-adds, a square root and a division.
   template <class Math, class V>
   static SWARMFIT_INLINE V residual(const Math m, const V* x, const V* k) {
     const V u = m.mul_add(x[0], k[0], m.mul_add(x[1], k[1], m.mul(x[2], k[2])));
     const V v = m.mul_add(x[0], k[3], m.mul_add(x[1], k[4], m.mul(x[2], k[5])));
-    const V across = m.mul(v, v);
-    const V power = m.mul_add(m.sub(u, k[6]), m.sub(u, k[7]), across);
     const V from_axis = m.sub(u, k[8]);
-    return m.div(power, m.add(m.sqrt(m.mul_add(from_axis, from_axis, across)), k[9]));
+    return signed_distance(m, u, v, k, m.sqrt(m.mul_add(from_axis, from_axis, m.mul(v, v))));
+  }
+
+  /// The same with its gradient and its bend: s away, it is above the tangent plane by at most bend s^2 / 2, and never below.
+  template <class Math, class V>
+  static SWARMFIT_INLINE V expand(const Math m, const V* x, const V* k, V* gradient, V& bend) {
+    const V u = m.mul_add(x[0], k[0], m.mul_add(x[1], k[1], m.mul(x[2], k[2])));
+    const V v = m.mul_add(x[0], k[3], m.mul_add(x[1], k[4], m.mul(x[2], k[5])));
+    const V from_axis = m.sub(u, k[8]);
+    const V length = m.max(m.sqrt(m.mul_add(from_axis, from_axis, m.mul(v, v))), m.set(1e-30));
+    bend = m.div(m.set(1.0), length);
+    for (int d = 0; d < 3; ++d) gradient[d] = m.mul(m.mul_add(from_axis, k[d], m.mul(v, k[3 + d])), bend);
+    return signed_distance(m, u, v, k, length);
   }
 
  private:
+  template <class Math, class V>
+  static SWARMFIT_INLINE V signed_distance(const Math m, V u, V v, const V* k, V length) {
+    return m.div(m.mul_add(m.sub(u, k[6]), m.sub(u, k[7]), m.mul(v, v)), m.add(length, k[9]));
+  }
+
   /// Takes the part along a unit vector out of v.
   static void reject(const double* unit, double* v) {
     const double along = v[0] * unit[0] + v[1] * unit[1] + v[2] * unit[2];

@@ -9,6 +9,13 @@ struct Line2d {
     k[2] = p[2] + p[0] * c[0] + p[1] * c[1];
   }
 
+  /// Size of the numbers that a residual adds up.
+  static float magnitude(const float* k, const float* reach) {
+    float size = std::abs(k[2]);
+    for (int d = 0; d < 2; ++d) size += std::abs(k[d]) * reach[d];
+    return size;
+  }
+
   /// Signed orthogonal distance.
   template <class Math, class V>
   static SWARMFIT_INLINE V residual(const Math m, const V* x, const V* k) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #define SWARMFIT_INLINE inline
 
@@ -27,6 +28,17 @@ bool centred_coefficients(ModelKind kind, const double* parameters, const double
     M::centre(parameters, centre, coefficients);
     return std::all_of(parameters, parameters + M::traits.parameter_count, finite) &&
            std::all_of(coefficients, coefficients + M::traits.coefficient_count, finite);
+  });
+}
+
+float residual_rounding(ModelKind kind, const float* coefficients, const float* reach) noexcept {
+  constexpr float kRounding = 2e-6F, kMost = 1e30F;
+  return visit_model(kind, [&]<class M>() {
+    if constexpr (M::traits.bounded) {
+      return std::min(kRounding * M::magnitude(coefficients, reach), kMost) + std::numeric_limits<float>::min();
+    } else {
+      return kMost;
+    }
   });
 }
 

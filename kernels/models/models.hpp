@@ -28,7 +28,8 @@ struct ModelTraits {
   int parameter_count = 0;    ///< doubles in the data's frame, as results give them
   int coefficient_count = 0;  ///< scalars in the centred frame, as kernels read them
   int multiply_adds = 0;      ///< fused multiply-adds one residual is worth: what the machine's limit is divided by
-  bool affine = false;        ///< the residual is n . x + offset with coefficients n, offset: boxes bound it
+  bool affine = false;        ///< the residual is n . x + offset with coefficients n, offset
+  bool bounded = affine;      ///< an orthogonal distance: a block bounds it by its expansion about the block's mean
 };
 
 /// One model among several, perhaps of several kinds.
@@ -44,5 +45,8 @@ std::optional<ModelKind> model_kind(std::string_view name) noexcept;
 /// parameters: parameter_count, centre: dimension, coefficients: coefficient_count. Returns false if a parameter or a coefficient is not
 /// finite.
 bool centred_coefficients(ModelKind kind, const double* parameters, const double* centre, double* coefficients) noexcept;
+
+/// What rounding may do to a residual in float, its own or a block's, at points whose coordinates are at most `reach`. Bounded kinds only.
+float residual_rounding(ModelKind kind, const float* coefficients, const float* reach) noexcept;
 
 }  // namespace swarmfit::kernels

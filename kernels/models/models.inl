@@ -2,7 +2,8 @@
 // own namespace, so that every SIMD target compiles its own copy (Highway includes a file once a target).
 //
 // A model is a struct with `kind`, `traits`, `centre` (parameters to coefficients in the centred frame) and
-// `residual(m, x, k)`, x the point's columns, k the coefficients. Math offers add, sub, mul, div, sqrt, mul_add(a, b, c) = a b + c,
+// `residual(m, x, k)`, x the point's columns, k the coefficients; where blocks bound it, `magnitude` and, unless it is affine, `expand`.
+// Math offers add, sub, mul, div, sqrt, mul_add(a, b, c) = a b + c,
 // neg_mul_add(a, b, c) = c - a b, and ratio(a, b) = a / b for a >= 0, infinite where b is not above 0.
 #include "kernels/models/ball.inl"
 #include "kernels/models/matrix3.inl"

@@ -10,6 +10,13 @@ struct Plane {
     k[3] = p[3] + p[0] * c[0] + p[1] * c[1] + p[2] * c[2];
   }
 
+  /// Size of the numbers that a residual adds up.
+  static float magnitude(const float* k, const float* reach) {
+    float size = std::abs(k[3]);
+    for (int d = 0; d < 3; ++d) size += std::abs(k[d]) * reach[d];
+    return size;
+  }
+
   /// Signed orthogonal distance.
   template <class Math, class V>
   static SWARMFIT_INLINE V residual(const Math m, const V* x, const V* k) {
