@@ -60,7 +60,8 @@ struct FitOptions {
   SWARMFIT_API Expected<> validate() const;
 };
 
-/// Told of each model the moment it is found; `stop` ends the fit with what there is.
+/// Told of each model the moment it is found; `stop` ends the fit with what there is. Of a cloud that was thinned, inliers and cost are
+/// those of the thinned cloud scaled to the whole; the result has the exact ones.
 enum class Verdict { go_on, stop };
 using ModelCallback = std::function<Verdict(const Model&)>;
 
