@@ -75,11 +75,16 @@ Settings preset(Preset preset) {
   return s;
 }
 
-/// Two views: eight dimensions are too many for a swarm to settle in by flight alone, so most particles start anew at every step; and
-/// points of one surface or body lie together in both images.
-Settings for_correspondences(Settings s, ModelType type) {
-  if (!s.joint) return s;
+/// What a kind asks of the search beyond the preset, where the preset is free to choose.
+Settings for_kind(Settings s, ModelType type) {
+  if (!s.joint || type == ModelType::line2d || type == ModelType::plane) return s;
+  // Few minimal samples of a curved model hit one surface, and flight alone seldom finds another basin: particles start anew all along.
+  s.renewal_share = 0.5;
+  s.patience = 3;
+  if (dimension(type) < 4) return s;
+  // In eight dimensions flight settles slowly; and points of one surface or body lie together in both images.
   s.renewal_share = 0.75;
+  s.patience = 2;
   s.prices = type == ModelType::homography ? LabelPrices{0.1, 7} : LabelPrices{0.2, 10};
   return s;
 }
@@ -97,7 +102,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
   s.threshold = threshold;
-  if (dimension(options.model) == 4) s = for_correspondences(s, options.model);
+  s = for_kind(s, options.model);
   const std::size_t fitted = s.fit_points > 0 ? std::min(s.fit_points, finite_points) : finite_points;
   s.stands_for = fitted > 0 ? static_cast<double>(finite_points) / static_cast<double>(fitted) : 1.0;
   // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.
