@@ -67,8 +67,8 @@ void Labelling::label(State& state) const {
   std::vector<std::uint16_t> order(state.models.size() + 1);
   std::iota(order.begin(), order.end(), std::uint16_t{0});
   state.labels = potts.cheapest();
-  const auto energy = edges_.empty() ? potts.energy(state.labels) : potts.minimise(order, kCycles, state.labels);
-  state.energy = static_cast<double>(energy) / kUnit + prices_.model * static_cast<double>(state.models.size());
+  if (!edges_.empty()) potts.minimise(order, kCycles, state.labels);
+  state.energy = static_cast<double>(potts.energy(state.labels)) / kUnit + prices_.model * static_cast<double>(state.models.size());
 }
 
 Expected<bool> Labelling::refit(State& state) const {

@@ -1,0 +1,119 @@
+// Every kind of model is found among outliers, by its preset, and its points are told from the others'.
+#include <algorithm>
+#include <array>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+#include <swarmfit/fit.hpp>
+
+#include "host/bench/bench_case.hpp"
+
+namespace swarmfit {
+namespace {
+
+constexpr std::size_t kModels = 4;
+
+class FitKinds : public testing::TestWithParam<ModelType> {
+ protected:
+  Expected<FitResult> fit_made(std::uint64_t seed, int threads = 0) const {
+    FitOptions options;
+    options.model = GetParam();
+    options.threshold = 0.015;
+    options.seed = seed;
+    options.backend = "cpu";
+    options.threads = threads;
+    return fit(PointsView(std::span<const float>(values_), dimension(GetParam())), options);
+  }
+
+  /// Normals need neighbours close by.
+  const std::size_t points_ = GetParam() == ModelType::cylinder ? 8000 : 1200;
+  const std::vector<float> values_ = bench_internal::synthetic_points(GetParam(), points_, 11);
+};
+
+TEST_P(FitKinds, EachTrueModelIsFoundAsOne) {
+  const auto result = fit_made(1);
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_EQ(result->labels.size(), points_);
+  std::set<std::size_t> used;
+  for (std::size_t k = 0; k < kModels; ++k) {
+    std::vector<std::size_t> votes(result->models.size() + 1, 0);
+    std::size_t all = 0;
+    for (std::size_t i = 0; i < points_; ++i) {
+      if (i % 10 >= 6 || i % kModels != k) continue;
+      ++votes[result->labels[i]];
+      ++all;
+    }
+    const auto most = static_cast<std::size_t>(std::max_element(votes.begin() + 1, votes.end()) - votes.begin());
+    ASSERT_LT(most, votes.size()) << "no model at all";
+    EXPECT_GT(votes[most], all * 3 / 4) << "model " << k << " of " << result->models.size();
+    EXPECT_TRUE(used.insert(most).second) << "model " << k << " shares its label";
+  }
+  for (const Model& model : result->models) {
+    EXPECT_EQ(model.type, GetParam());
+    EXPECT_GT(model.inliers, 0U);
+    EXPECT_TRUE(model.parameters.allFinite());
+    EXPECT_TRUE(model.covariance.allFinite());
+    EXPECT_EQ(model.covariance.rows(), model.parameters.size());
+  }
+}
+
+TEST_P(FitKinds, SameAnswerOnOneThreadAndTwo) {
+  const auto one = fit_made(3, 1), two = fit_made(3, 2);
+  ASSERT_TRUE(one && two);
+  EXPECT_EQ(one->labels, two->labels);
+  ASSERT_EQ(one->models.size(), two->models.size());
+  for (std::size_t m = 0; m < one->models.size(); ++m) EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, FitKinds,
+                         testing::Values(ModelType::line2d, ModelType::plane, ModelType::circle2d, ModelType::sphere, ModelType::cylinder,
+                                         ModelType::homography),
+                         [](const auto& kind) { return std::string(name(kind.param)); });
+
+/// Three bodies that move each in its own way, side by side in the image [px], and correspondences that are wrong.
+TEST(FitFundamental, BodiesInMotionAreToldApart) {
+  std::mt19937_64 engine(5);
+  const auto uniform = [&](double low, double high) { return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53; };
+  constexpr std::size_t kBodies = 3, kEach = 120, kWrong = 120;
+  constexpr double kAngles[kBodies] = {0.15, -0.2, 0.25};
+  const std::array<Eigen::Vector3d, kBodies> shifts{Eigen::Vector3d(0.6, 0, 0), Eigen::Vector3d(0, 0.6, 0.3),
+                                                    Eigen::Vector3d(-0.2, 0.1, 1)};
+  std::vector<double> rows;
+  for (std::size_t k = 0; k < kBodies; ++k) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(kAngles[k], Eigen::Vector3d::Unit(static_cast<Eigen::Index>(k))).toRotationMatrix();
+    const Eigen::Vector3d& shift = shifts[k];
+    const Eigen::Vector3d middle(1.6 * (static_cast<double>(k) - 1), 0, 5);
+    for (std::size_t i = 0; i < kEach; ++i) {
+      const Eigen::Vector3d p = middle + Eigen::Vector3d(uniform(-0.7, 0.7), uniform(-1, 1), uniform(-1, 1));
+      const Eigen::Vector3d q = turn * (p - middle) + middle + shift;
+      for (const Eigen::Vector3d& v : {p, q}) {
+        rows.push_back(600 * v[0] / v[2] + 320 + uniform(-0.4, 0.4));
+        rows.push_back(600 * v[1] / v[2] + 240 + uniform(-0.4, 0.4));
+      }
+    }
+  }
+  for (std::size_t i = 0; i < 2 * kWrong; ++i) rows.insert(rows.end(), {uniform(0, 640), uniform(0, 480)});
+  FitOptions options;
+  options.model = ModelType::fundamental;
+  options.backend = "cpu";
+  const auto result = fit(PointsView(std::span<const double>(rows), 4), options);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->models.size(), kBodies);
+  std::set<std::uint16_t> used;
+  for (std::size_t k = 0; k < kBodies; ++k) {
+    std::vector<std::size_t> votes(result->models.size() + 1, 0);
+    for (std::size_t i = k * kEach; i < (k + 1) * kEach; ++i) ++votes[result->labels[i]];
+    const auto most = std::max_element(votes.begin(), votes.end()) - votes.begin();
+    EXPECT_GT(votes[static_cast<std::size_t>(most)], kEach * 85 / 100) << "body " << k;
+    EXPECT_NE(most, 0) << "body " << k;
+    EXPECT_TRUE(used.insert(static_cast<std::uint16_t>(most)).second) << "body " << k << " shares its label";
+  }
+}
+
+}  // namespace
+}  // namespace swarmfit
