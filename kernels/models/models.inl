@@ -3,8 +3,8 @@
 //
 // A model is a struct with `kind`, `traits`, `centre` (parameters to coefficients in the centred frame) and
 // `residual(m, x, k)`, x the point's columns, k the coefficients; where blocks bound it, `magnitude` and, unless it is affine, `expand`.
-// Math offers add, sub, mul, div, sqrt, mul_add(a, b, c) = a b + c,
-// neg_mul_add(a, b, c) = c - a b, and ratio(a, b) = a / b for a >= 0, infinite where b is not above 0.
+// Math offers add, sub, mul, div, sqrt, mul_add(a, b, c) = a b + c, neg_mul_add(a, b, c) = c - a b, and ratio(a, b) = a / b for a >= 0,
+// infinite where b is not above 0; for `expand` also set(double) and max.
 #include "kernels/models/ball.inl"
 #include "kernels/models/matrix3.inl"
 
