@@ -71,7 +71,7 @@ HWY_INLINE Vector loss_of(Vector distance, Vector limit) {
 /// Lane sums of one block for `P` models held in registers. Two accumulators a model hide the addition's latency; their order is part
 /// of the answer and the same for every P.
 template <class Model, Loss loss, int P>
-HWY_NOINLINE void block_sums(const TileView& tile, std::size_t first, const float* const* coefficients, Vector* total) {
+HWY_INLINE void block_sums(const TileView& tile, std::size_t first, const float* const* coefficients, Vector* total) {
   constexpr int D = Model::traits.dimension;
   constexpr int C = Model::traits.coefficient_count;
   constexpr std::size_t L = lanes();
