@@ -210,6 +210,7 @@ ObjectLabels separate(const PointGrid& grid, const Popout& popout, const Groupin
 }
 
 void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_support, ObjectLabels& objects) {
+  if (objects.support.empty()) return;  // no object, no basin
   const auto thumb = shrink(grid, on_support, objects);
   std::vector<std::size_t> size(objects.support.size() + 1, 0);
   for (const auto o : thumb.object) ++size[o];
