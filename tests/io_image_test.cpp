@@ -7,6 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <swarmfit/cloud.hpp>
+#include <swarmfit/images.hpp>
 
 #include "host/io/calib.hpp"
 #include "tests/io_files.hpp"
@@ -53,6 +54,46 @@ TEST(Depth, BackProjects) {
   EXPECT_FLOAT_EQ(p[2], 1.011F);
   EXPECT_FLOAT_EQ(p[0], 1.011F * 1.5F / 600);
   EXPECT_FLOAT_EQ(p[1], 1.011F / 610);
+}
+
+TEST(Depth, FromMemoryAsFromFiles) {
+  const TemporaryFolder folder;
+  const auto file = depth_image(folder);
+  const auto colours = colour_image(folder, "c.png", 4, 3);
+  const auto read = read_rgbd(colours, file, kCamera, 0.001);
+  ASSERT_TRUE(read) << read.error().message;
+
+  const cv::Mat depth = cv::imread(file.string(), cv::IMREAD_UNCHANGED), bgr = cv::imread(colours.string());
+  cv::Mat wide(3, 7, CV_16U, cv::Scalar(9)), metres;  // rows further apart than they are long
+  depth.copyTo(wide.colRange(0, 4));
+  depth.convertTo(metres, CV_32F);
+  const ColourView colour{bgr.data, ColourView::Order::bgr, 4, 3, 0};
+  const auto whole = make_cloud({wide.data, DepthView::Scalar::uint16, 4, 3, wide.step}, kCamera, 0.001, colour);
+  const auto real = make_cloud({metres.data, DepthView::Scalar::float32, 4, 3, 0}, kCamera, 0.001);
+  ASSERT_TRUE(whole) << whole.error().message;
+  ASSERT_TRUE(real) << real.error().message;
+  EXPECT_EQ(whole->rgb, read->rgb);
+  EXPECT_TRUE(real->rgb.empty());
+  for (std::size_t i = 0; i < read->values32.size(); ++i) {
+    if (std::isnan(read->values32[i])) {
+      EXPECT_TRUE(std::isnan(whole->values32[i]) && std::isnan(real->values32[i]));
+    } else {
+      EXPECT_EQ(whole->values32[i], read->values32[i]);
+      EXPECT_EQ(real->values32[i], read->values32[i]);
+    }
+  }
+
+  const std::uint8_t rgb[] = {1, 2, 3, 4, 5, 6};
+  const float z[] = {1, -1};
+  const DepthView pair{z, DepthView::Scalar::float32, 2, 1, 0};
+  const auto small = make_cloud(pair, kCamera, 1, {rgb, ColourView::Order::rgb, 2, 1, 0});
+  ASSERT_TRUE(small);
+  EXPECT_EQ(small->rgb, (std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6}));
+  EXPECT_TRUE(std::isnan(small->values32[5]));
+  expect_error(make_cloud({}, kCamera, 1), Error::Kind::bad_input, "depth image is 0 x 0 pixels, must be >= 1 x 1");
+  expect_error(make_cloud(pair, kCamera, 0), Error::Kind::invalid_option, "depth scale: 0, must be > 0");
+  expect_error(make_cloud(pair, kCamera, 1, {rgb, ColourView::Order::rgb, 1, 2, 0}), Error::Kind::bad_input, "must be 2 x 1 as the depth");
+  expect_error(make_cloud({z, DepthView::Scalar::float32, 2, 1, 4}, kCamera, 1), Error::Kind::invalid_option, "depth row_step: 4, must be");
 }
 
 TEST(Depth, ColoursInOrder) {

@@ -11,7 +11,7 @@ namespace swarmfit::io {
 Expected<> check_intrinsics(const Intrinsics& intrinsics);
 /// z: CV_32F [m], NaN for none.
 void back_project(const cv::Mat& z, const Intrinsics& intrinsics, Cloud& cloud);
-/// bgr: CV_8UC3 of the cloud's size.
-void take_colours(const cv::Mat& bgr, Cloud& cloud);
+/// CV_8UC3 of the cloud's size, red first or last.
+void take_colours(const cv::Mat& image, bool rgb, Cloud& cloud);
 
 }  // namespace swarmfit::io

@@ -73,7 +73,7 @@ Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::
   }
   Cloud cloud;
   back_project(z, calib->left, cloud);
-  take_colours(*left, cloud);
+  take_colours(*left, false, cloud);
   cloud.passive_stereo = true;
   return cloud;
 }
