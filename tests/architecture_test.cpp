@@ -139,6 +139,12 @@ TEST(Architecture, TheCommandUsesInstalledHeaders) {
   });
 }
 
+TEST(Architecture, ThePythonPackageUsesInstalledHeaders) {
+  expect_includes({"python/"}, {}, [](std::string_view include) {
+    return is_standard(include) || starts_with_any(include, {"swarmfit/", "python/", "Eigen/", "nanobind/"});
+  });
+}
+
 TEST(Architecture, SamplesUseInstalledHeaders) {
   expect_includes({"samples/"}, {}, [](std::string_view include) {
     return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/"});
@@ -186,7 +192,7 @@ TEST(Architecture, NoBuildFileAsksForThisMachineOnly) {
   };
   check(root / "CMakeLists.txt");
   check(root / "CMakePresets.json");
-  for (const char* room : {"cmake", "shaders", "kernels", "host", "tests", "samples", "tools"}) {
+  for (const char* room : {"cmake", "shaders", "kernels", "host", "tests", "samples", "python", "tools"}) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / room)) {
       const fs::path& path = entry.path();
       if (path.filename() == "CMakeLists.txt" || path.extension() == ".cmake" || path.extension() == ".sh") check(path);

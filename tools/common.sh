@@ -15,3 +15,18 @@ configure() {
     return 1
   }
 }
+
+# python_environment: build/python, a virtual environment with what building and testing the Python package takes. Says why where it
+# cannot be made, and fails.
+python_environment() {
+  local folder=$root/build/python wanted=(nanobind numpy pytest mypy)
+  if [ "$(cat "$folder/installed" 2>/dev/null)" = "${wanted[*]}" ]; then return 0; fi
+  mkdir -p "$root/build"
+  if { python3 -m venv --clear "$folder" && "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${wanted[@]}"; } \
+      >"$root/build/python-environment.log" 2>&1; then
+    echo "${wanted[*]}" >"$folder/installed"
+  else
+    echo "the Python package is left out: $(tail -n 1 "$root/build/python-environment.log")" >&2
+    return 1
+  fi
+}

@@ -14,6 +14,8 @@ packages=(
   libopencv-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev
+  # the Python package; nanobind comes from pip
+  python3-dev python3-venv
   # the Motorcycle stereo pair
   python3-skimage
 )

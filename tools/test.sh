@@ -7,6 +7,7 @@ usage() {
   cat <<END
 usage: tools/test.sh [--sanitize] [ctest argument...]
   --sanitize  build with AddressSanitizer and UndefinedBehaviorSanitizer, in a folder of its own
+The Python package is built and tested, too, where pip can fetch nanobind, numpy, pytest and mypy; not with --sanitize.
 Vulkan must work: Debian's software device will do, and tools/setup.sh installs it.
 SWARMFIT_DATA_DIR names a folder of captured data; tests that need it skip, and say so, where it is unset.
 END
@@ -20,8 +21,12 @@ esac
 
 tools/setup.sh
 mkdir -p build
+python=(-DSWARMFIT_BUILD_PYTHON=OFF)
+if [ "$preset" = ci ] && python_environment; then
+  python=(-DSWARMFIT_BUILD_PYTHON=ON "-DPython_EXECUTABLE=$root/build/python/bin/python")
+fi
 say "building ($preset)"
-configure "$preset"
+configure "$preset" "${python[@]}"
 cmake --build --preset "$preset"
 say "testing"
 if [ "$preset" = asan ]; then
