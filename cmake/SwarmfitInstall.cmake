@@ -1,4 +1,4 @@
-# Install rules and the exported package: find_package(swarmfit) gives swarmfit::swarmfit.
+# Install rules and what others find the library by: find_package(swarmfit), pkg-config swarmfit, a ROS workspace's package.xml.
 include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/swarmfit)
 
@@ -16,3 +16,28 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/swarmfitConfig.cmake.in 
   INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/swarmfitConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/swarmfitConfig.cmake ${PROJECT_BINARY_DIR}/swarmfitConfigVersion.cmake DESTINATION ${package_dir})
+
+# pkg-config: who links a static library links what is inside it, too.
+file(RELATIVE_PATH SWARMFIT_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" SWARMFIT_PC_PREFIX "${SWARMFIT_PC_PREFIX}")
+list(TRANSFORM SWARMFIT_OPENCV_TARGETS PREPEND " -l" OUTPUT_VARIABLE inside)
+string(JOIN "" inside " -lfmt -ltbb -lhwy -llzf" ${inside} " -ldl -lpthread -lstdc++ -lm")
+if(BUILD_SHARED_LIBS)
+  set(SWARMFIT_PC_LIBS)
+  set(SWARMFIT_PC_LIBS_PRIVATE "${inside}")
+else()
+  set(SWARMFIT_PC_LIBS "${inside}")
+  set(SWARMFIT_PC_LIBS_PRIVATE)
+endif()
+configure_file(${CMAKE_CURRENT_LIST_DIR}/swarmfit.pc.in ${PROJECT_BINARY_DIR}/swarmfit.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/swarmfit.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+file(READ ${PROJECT_SOURCE_DIR}/package.xml manifest)
+if(NOT manifest MATCHES "<version>${PROJECT_VERSION}</version>")
+  message(FATAL_ERROR "package.xml must hold <version>${PROJECT_VERSION}</version>, as version.hpp does")
+endif()
+install(FILES ${PROJECT_SOURCE_DIR}/package.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/swarmfit)
+
+if(PROJECT_IS_TOP_LEVEL)
+  include(SwarmfitPackage)
+endif()

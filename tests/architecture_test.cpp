@@ -126,9 +126,18 @@ TEST(Architecture, TheHostSpeaksToTheSeam) {
 }
 
 TEST(Architecture, InstalledHeadersNeedOnlyEigenAndExpected) {
-  expect_includes({"host/include/"}, {}, [](std::string_view include) {
+  const auto allowed = [](std::string_view include) {
     return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/"}) || include == "tl/expected.hpp";
-  });
+  };
+  expect_includes({"host/include/"}, {"host/include/swarmfit/adapters/opencv.hpp"}, allowed);
+  // cv::Mat is no template: its adapter alone names the library it is for.
+  expect_includes({"host/include/swarmfit/adapters/opencv.hpp"}, {},
+                  [&](std::string_view include) { return allowed(include) || include == "opencv2/core.hpp"; });
+}
+
+TEST(Architecture, AdaptersCostNothingUnlessAskedFor) {
+  expect_includes({"kernels/", "host/", "python/"}, {"host/include/swarmfit/adapters/"},
+                  [](std::string_view include) { return !include.starts_with("swarmfit/adapters/"); });
 }
 
 TEST(Architecture, TheCommandUsesInstalledHeaders) {
@@ -146,8 +155,11 @@ TEST(Architecture, ThePythonPackageUsesInstalledHeaders) {
 }
 
 TEST(Architecture, SamplesUseInstalledHeaders) {
-  expect_includes({"samples/"}, {}, [](std::string_view include) {
+  expect_includes({"samples/"}, {"samples/pcl_"}, [](std::string_view include) {
     return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/"});
+  });
+  expect_includes({"samples/pcl_"}, {}, [](std::string_view include) {
+    return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/", "pcl/"});
   });
 }
 
@@ -234,7 +246,7 @@ TEST(Readme, ShowsTheProgramThatIsCompiledAndRun) {
 
 TEST(Readme, EveryFileItPointsToExists) {
   static const std::regex link(R"(\]\(([^)#:]+)\))");
-  for (const char* page : {"README.md", "CONTRIBUTING.md", "docs/architecture.md", "docs/method.md"}) {
+  for (const char* page : {"README.md", "CONTRIBUTING.md", "docs/architecture.md", "docs/embedding.md", "docs/method.md"}) {
     const std::string text = read(root / page);
     ASSERT_FALSE(text.empty()) << page;
     for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it) {

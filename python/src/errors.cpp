@@ -1,6 +1,7 @@
 #include "python/src/errors.hpp"
 
 #include <array>
+#include <string>
 
 #include "python/src/bindings.hpp"
 

@@ -1,6 +1,10 @@
 #include <atomic>
 #include <memory>
+#include <optional>
+#include <stdexcept>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nanobind/stl/shared_ptr.h>
@@ -140,12 +144,6 @@ void bind_fitting(nb::module_& module) {
             return std::make_unique<ModelStream>(std::move(self), points, std::move(warm_start));
           },
           "points"_a, "warm_start"_a = std::vector<Model>())
-      .def("set_options",
-           [](std::shared_ptr<Workshop> self, const nb::kwargs& options) {
-             const FitOptions wanted = fit_options(options);
-             const Shift shift(std::move(self));
-             value_of(shift.fitter().set_options(wanted));
-           })
       .def_prop_ro("backend", [](const Workshop& self) {
         const BackendInfo info = self.fitter.backend();
         return nb::make_tuple(info.name, info.device, info.reason);

@@ -34,7 +34,7 @@ class Stats:
 
 @dataclass(frozen=True)
 class FitResult:
-    """All models found in a cloud, best explained first."""
+    """All models found in a cloud, in the order found."""
 
     models: list[_core.Model]
     labels: NDArray[np.uint16]  #: the input's shape without its last axis: 0 none, k for models[k - 1]
