@@ -16,6 +16,8 @@ packages=(
   libgtest-dev libbenchmark-dev
   # the Python package; nanobind comes from pip
   python3-dev python3-venv
+  # the installed pkg-config file
+  pkgconf
   # the Motorcycle stereo pair
   python3-skimage
 )
