@@ -6,12 +6,11 @@
 #include <limits>
 #include <new>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <oneapi/tbb/info.h>
-#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include "kernels/checks.hpp"
@@ -43,6 +42,9 @@ bool same_ignoring_case(std::string_view a, std::string_view b) {
 /// Without the number of threads: a result is the same bytes on any.
 std::string device_name(const CpuKernels& kernels) { return fmt::format("CPU, {}", kernels.name); }
 
+/// That this process may run on. Not asked of TBB, which would start its scheduler.
+int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
+
 /// Work that may run out of memory, with the failure as a value.
 template <class Work>
 Result<> guarded(std::size_t points, Work&& work) {
@@ -70,7 +72,7 @@ class CpuEvaluator final : public FitnessEvaluator {
     effort_ = {};
     costs_.forget();
     if (auto ok = check_points(points); !ok) return ok;
-    return guarded(points.count, [&] { arena_.execute([&] { store_.assign(points); }); });
+    return guarded(points.count, [&] { run_in(arena_, worth_sharing(points.count), [&] { store_.assign(points); }); });
   }
 
   Result<> set_caps(std::span<const float> caps) override {
@@ -82,7 +84,7 @@ class CpuEvaluator final : public FitnessEvaluator {
       }
     }
     costs_.forget();
-    arena_.execute([&] { store_.set_caps(caps); });
+    run_in(arena_, worth_sharing(store_.count()), [&] { store_.set_caps(caps); });
     return {};
   }
 
@@ -91,7 +93,8 @@ class CpuEvaluator final : public FitnessEvaluator {
     return guarded(store_.count(), [&] {
       centre(swarm);
       const CentredSwarm centred{swarm.kind, swarm.count, coefficients_, finite_, cutoffs};
-      arena_.execute([&] { effort_.touched += costs_.evaluate(store_, centred, loss, costs); });
+      const auto work = [&] { effort_.touched += costs_.evaluate(store_, centred, loss, costs); };
+      run_in(arena_, worth_sharing(store_.finite(), swarm.count), work);
       effort_.evaluations += swarm.count;
       effort_.point_models += swarm.count * store_.finite();
     });
@@ -103,8 +106,8 @@ class CpuEvaluator final : public FitnessEvaluator {
     std::array<float, kMaxCoefficients> k{};
     const bool finite = centre(model, k.data());
     std::fill(distances.begin(), distances.end(), std::numeric_limits<float>::quiet_NaN());
-    arena_.execute([&] {
-      tbb::parallel_for(std::size_t{0}, store_.tiles(), [&](std::size_t tile) {
+    run_in(arena_, worth_sharing(store_.count()), [&] {
+      for_each_task(store_.tiles(), [&](std::size_t tile) {
         alignas(64) std::array<float, kTilePoints> near;
         if (finite) {
           kernels_.distances(model.kind, store_.tile(tile), k.data(), near.data());
@@ -126,9 +129,8 @@ class CpuEvaluator final : public FitnessEvaluator {
       std::vector<char> usable(models.size());
       for (std::size_t m = 0; m < models.size(); ++m) usable[m] = centre(models[m], coefficients[m].data());
       std::fill(labels.begin(), labels.end(), std::uint16_t{0});
-      arena_.execute([&] {
-        tbb::parallel_for(std::size_t{0}, store_.tiles(),
-                          [&](std::size_t tile) { assign_tile(tile, models, coefficients, usable, tolerance, labels); });
+      run_in(arena_, worth_sharing(store_.count()), [&] {
+        for_each_task(store_.tiles(), [&](std::size_t tile) { assign_tile(tile, models, coefficients, usable, tolerance, labels); });
       });
     });
   }
@@ -137,19 +139,22 @@ class CpuEvaluator final : public FitnessEvaluator {
 
   Result<> survey(const PointsView& points, Survey& survey) override {
     if (auto ok = check_points(points); !ok) return ok;
-    return guarded(points.count, [&] { arena_.execute([&] { passes_.survey(points, survey); }); });
+    return guarded(points.count, [&] { run_in(arena_, worth_sharing(points.count), [&] { passes_.survey(points, survey); }); });
   }
 
   Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                  std::span<Evidence> evidence) override {
     if (auto ok = check_weigh(points, how, models, distances, evidence); !ok) return ok;
-    return guarded(points.count, [&] { arena_.execute([&] { passes_.weigh(points, how, models, distances, evidence); }); });
+    return guarded(points.count,
+                   [&] { run_in(arena_, worth_sharing(points.count), [&] { passes_.weigh(points, how, models, distances, evidence); }); });
   }
 
   Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
                  std::span<Evidence> evidence) override {
     if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
-    return guarded(points.count, [&] { arena_.execute([&] { passes_.claim(points, tolerance, models, labels, evidence); }); });
+    return guarded(points.count, [&] {
+      run_in(arena_, worth_sharing(points.count), [&] { passes_.claim(points, tolerance, models, labels, evidence); });
+    });
   }
 
  private:
@@ -237,7 +242,7 @@ Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOpti
     return fail(Failure::Kind::invalid, fmt::format("threads is {}, must be in [0, {}]", options.threads, kMaxThreads));
   }
   // More threads than processors would only be refused, aloud, by TBB.
-  const int most = tbb::info::default_concurrency();
+  const int most = processors();
   const int threads = options.threads > 0 ? std::min(options.threads, most) : most;
   for (const CpuKernels* kernels : available_kernels()) {
     if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name))
@@ -248,7 +253,7 @@ Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOpti
 }
 
 std::vector<DeviceDescription> cpu_devices() {
-  const int threads = tbb::info::default_concurrency();
+  const int threads = processors();
   DeviceDescription device{"cpu", device_name(*available_kernels().front()), "cpu", true, "always there", {}};
   device.limits.emplace_back("instruction sets", fmt::format("{}", fmt::join(kernel_names(), ", ")));
   device.limits.emplace_back("threads", fmt::format("{}", threads));

@@ -8,7 +8,7 @@
 #include <limits>
 #include <type_traits>
 
-#include <oneapi/tbb/parallel_for.h>
+#include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels::cpu {
 namespace {
@@ -161,7 +161,7 @@ struct Bench {
 template <class Body>
 void for_strips(const PointsView& points, Body&& body) {
   const std::size_t strips = (points.count + kStripPoints - 1) / kStripPoints;
-  tbb::parallel_for(std::size_t{0}, run_count(points), [&](std::size_t run) {
+  for_each_task(run_count(points), [&](std::size_t run) {
     Bench bench;
     for (std::size_t strip = run * kRunStrips; strip < std::min(strips, (run + 1) * kRunStrips); ++strip) body(bench, run, strip);
   });

@@ -4,9 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_reduce.h>
+#include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels::cpu {
 namespace {
@@ -48,7 +46,7 @@ void PointStore::assign(const PointsView& points) {
   most_cap_ = 0;
   bounds_current_ = false;
   std::vector<Chunk> chunks((count_ + kChunkRows - 1) / kChunkRows);
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t chunk) {
+  for_each_task(chunks.size(), [&](std::size_t chunk) {
     Chunk summary;
     visit_chunk(points, chunk, [&](std::size_t, const std::array<double, kMaxDimension>& x) {
       ++summary.finite;
@@ -78,7 +76,7 @@ void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunk
   for (std::size_t c = 0; c < kMaxDimension; ++c) columns_[c].resize(c < width ? padded : 0);
   caps_.assign(padded, 0.0F);
   input_.resize(finite_ == count_ ? 0 : finite_);
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t chunk) {
+  for_each_task(chunks.size(), [&](std::size_t chunk) {
     std::size_t position = chunks[chunk].start;
     visit_chunk(points, chunk, [&](std::size_t row, const std::array<double, kMaxDimension>& x) {
       for (std::size_t c = 0; c < width; ++c) {
@@ -103,8 +101,8 @@ void PointStore::sort() {
   for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
   const std::span<const std::uint32_t> order = order_.sort(std::span(columns).first(width), finite_);
   const auto each = [&](auto&& body) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, finite_, kChunkRows), [&](const tbb::blocked_range<std::size_t>& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+    for_each_task((finite_ + kChunkRows - 1) / kChunkRows, [&](std::size_t chunk) {
+      for (std::size_t i = chunk * kChunkRows; i < std::min(finite_, (chunk + 1) * kChunkRows); ++i) body(i);
     });
   };
   for (std::size_t c = 0; c < width; ++c) {
@@ -124,16 +122,14 @@ void PointStore::sort() {
 
 void PointStore::set_caps(std::span<const float> caps) {
   bounds_current_ = false;
-  most_cap_ = tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, finite_, kChunkRows), 0.0F,
-      [&](const tbb::blocked_range<std::size_t>& range, float most) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-          caps_[i] = caps[input_index(i)];
-          most = std::max(most, caps_[i]);
-        }
-        return most;
-      },
-      [](float a, float b) { return std::max(a, b); });
+  std::vector<float> most((finite_ + kChunkRows - 1) / kChunkRows);
+  for_each_task(most.size(), [&](std::size_t chunk) {
+    for (std::size_t i = chunk * kChunkRows; i < std::min(finite_, (chunk + 1) * kChunkRows); ++i) {
+      caps_[i] = caps[input_index(i)];
+      most[chunk] = std::max(most[chunk], caps_[i]);
+    }
+  });
+  most_cap_ = most.empty() ? 0.0F : *std::max_element(most.begin(), most.end());
 }
 
 Summing PointStore::summing(Loss loss) const noexcept {
@@ -154,7 +150,7 @@ Summing PointStore::summing(Loss loss) const noexcept {
 void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summing) {
   if (bounds_current_ && bounds_summing_.loss == summing.loss && bounds_summing_.scale == summing.scale) return;
   bounds_.resize(tiles());
-  tbb::parallel_for(std::size_t{0}, tiles(), [&](std::size_t index) {
+  for_each_task(tiles(), [&](std::size_t index) {
     const TileView view = tile(index);
     TileBounds& bounds = bounds_[index];
     for (std::size_t block = 0; block < kTileBlocks; ++block) {

@@ -7,6 +7,7 @@
 
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/cpu/point_store.hpp"
+#include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels::cpu {
 
@@ -19,7 +20,7 @@ struct CentredSwarm {
   std::span<const float> cutoffs;
 };
 
-/// Works in the caller's task arena. Tiles are taken in runs and models in groups: each pair is a task and writes its own partial sums,
+/// Works in the caller's task arena, where the work is worth_sharing. Tiles are taken in runs and models in groups: each pair is a task and writes its own partial sums,
 /// which are added up in a fixed order.
 class SwarmCosts {
  public:
