@@ -15,7 +15,7 @@ constexpr double kLeastRank = 1e-12;  // of the information matrix: below, the p
 }  // namespace
 
 double CurvedSpace::distance(const Position& a, const Position& b) const {
-  Eigen::VectorXd v(parameter_count());
+  Position v(parameter_count());
   difference(a, b, v);
   return v.norm();
 }
@@ -66,7 +66,7 @@ bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, P
       damped.diagonal() *= 1 + damping;
       const Eigen::LDLT<Normal> solver(damped);
       if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > kLeastRank * solver.vectorD().maxCoeff())) return moved;
-      const Eigen::VectorXd by = solver.solve(-at.gradient);
+      const Position by = solver.solve(-at.gradient);
       Position candidate = retract(best, by);
       if (!candidate.allFinite() || !admit(candidate)) continue;
       const double now = squares(points, support, candidate);
@@ -100,13 +100,12 @@ Eigen::MatrixXd CurvedSpace::covariance_to_data(const Eigen::MatrixXd& covarianc
   // to_data is smooth and well scaled in the working frame: central differences lose nothing that a covariance would show.
   constexpr double kStep = 1e-5;
   const int n = parameter_count();
-  const Eigen::VectorXd here = to_data(theta, frame);
   Eigen::MatrixXd jacobian(n, n);
   for (int i = 0; i < n; ++i) {
     Position ahead = theta, behind = theta;
     ahead[i] += kStep;
     behind[i] -= kStep;
-    Eigen::VectorXd a = to_data(ahead, frame), b = to_data(behind, frame);
+    Position a = to_data(ahead, frame), b = to_data(behind, frame);
     jacobian.col(i) = (a - b) / (2 * kStep);
   }
   return jacobian * covariance * jacobian.transpose();

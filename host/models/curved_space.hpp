@@ -37,7 +37,7 @@ class CurvedSpace : public ModelSpace {
   /// Derivative of the position's entries by the chart, parameter_count() x freedom().
   virtual Basis basis(const Position& theta) const = 0;
   /// The position at `step` of the chart around theta.
-  virtual Position retract(const Position& theta, const Eigen::VectorXd& step) const = 0;
+  virtual Position retract(const Position& theta, const Position& step) const = 0;
 
  private:
   using Normal = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFreedom, kMostFreedom>;

@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "host/models/curved_space.hpp"
+#include "host/models/sphere_maps.hpp"
 
 namespace swarmfit::models {
 namespace {
@@ -53,39 +54,28 @@ class Cylinder final : public CurvedSpace {
   void difference(const Position& from, const Position& to, Eigen::Ref<Eigen::VectorXd> velocity) const override {
     const Vector a = from.segment<3>(3);
     const Vector b = a.dot(to.segment<3>(3)) < 0 ? Vector(-to.segment<3>(3)) : Vector(to.segment<3>(3));
-    const Vector across = b - a.dot(b) * a;
-    const double sine = across.norm(), angle = std::atan2(sine, a.dot(b));
     velocity.head<3>() = to.head<3>() - from.head<3>();
-    velocity.segment<3>(3) = sine > 1e-300 ? Vector(across * (angle / sine)) : Vector(Vector::Zero());
+    velocity.segment<3>(3) = way_between(a, b);
     velocity[6] = to[6] - from[6];
   }
 
   void move(Position& theta, Eigen::Ref<Eigen::VectorXd> velocity) const override {
-    const Vector a = theta.segment<3>(3);
-    Vector v = velocity.segment<3>(3);
-    v -= a.dot(v) * a;
-    constexpr double kQuarterTurn = 1.5707963267948966;
-    if (v.norm() > kQuarterTurn) v *= kQuarterTurn / v.norm();
-    const double angle = v.norm();
+    Vector axis = theta.segment<3>(3), v = velocity.segment<3>(3);
+    follow(axis, v);
     theta.head<3>() += velocity.head<3>();
+    theta.segment<3>(3) = axis;
     theta[6] += velocity[6];
-    if (angle > 1e-300) {
-      const Vector direction = v / angle;
-      theta.segment<3>(3) = (std::cos(angle) * a + std::sin(angle) * direction).normalized();
-      velocity.segment<3>(3) = angle * (std::cos(angle) * direction - std::sin(angle) * a);
-    } else {
-      velocity.segment<3>(3).setZero();
-    }
+    velocity.segment<3>(3) = v;
   }
 
-  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
-    Eigen::VectorXd parameters = theta;
+  Position to_data(const Position& theta, const Frame& frame) const override {
+    Position parameters = theta;
     parameters.head<3>() *= frame.scale;
     for (int d = 0; d < 3; ++d) parameters[d] += frame.centre[static_cast<std::size_t>(d)];
     parameters[6] *= frame.scale;
     return parameters;
   }
-  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+  Position from_data(const Position& parameters, const Frame& frame) const override {
     Position theta = parameters;
     for (int d = 0; d < 3; ++d) theta[d] -= frame.centre[static_cast<std::size_t>(d)];
     theta.head<3>() /= frame.scale;
@@ -127,7 +117,7 @@ class Cylinder final : public CurvedSpace {
     chart(6, 4) = 1;
     return chart;
   }
-  Position retract(const Position& theta, const Eigen::VectorXd& step) const override {
+  Position retract(const Position& theta, const Position& step) const override {
     Position moved = theta + basis(theta) * step;
     moved.segment<3>(3).normalize();
     return moved;

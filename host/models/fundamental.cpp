@@ -72,19 +72,30 @@ class Fundamental final : public Projective {
     return admit(theta);
   }
 
-  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
+  Position to_data(const Position& theta, const Frame& frame) const override {
     return position(from_image(frame, 1).transpose() * matrix(theta) * from_image(frame, 0));
   }
-  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+  Position from_data(const Position& parameters, const Frame& frame) const override {
     return position(to_image(frame, 1).transpose() * matrix(parameters) * to_image(frame, 0));
   }
 
-  /// The nearest matrix of rank 2.
+  /// The nearest matrix of rank 2, to first order: along the gradient of the determinant, its cofactors, until that is zero. A unit
+  /// matrix of rank 2 is left by a step of the swarm so little that two steps are the rule; the singular values take over where not.
   bool admit(Position& theta) const override {
     if (!theta.allFinite()) return false;
+    Matrix m = matrix(theta);
+    for (int step = 0; step < 4; ++step) {
+      const Matrix by_entry = cofactors(m);
+      const double slope = by_entry.squaredNorm(), determinant = m.row(0).dot(by_entry.row(0));
+      if (!(slope > kLeastSlope)) return false;
+      if (std::abs(determinant) < kNoDeterminant) {
+        theta = position(m);
+        return true;
+      }
+      m -= (determinant / slope) * by_entry;
+    }
     const Svd svd(matrix(theta), Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Vector3d s = svd.singularValues();
-    if (!(s[1] > 1e-9 * s[0])) return false;
     s[2] = 0;
     theta = position(svd.matrixU() * s.asDiagonal() * svd.matrixV().transpose());
     return true;
@@ -121,7 +132,7 @@ class Fundamental final : public Projective {
     chart.col(6) = flat(u * Eigen::Vector3d(-s[1], s[0], 0).asDiagonal() * v.transpose());
     return chart;
   }
-  Position retract(const Position& theta, const Eigen::VectorXd& step) const override {
+  Position retract(const Position& theta, const Position& step) const override {
     const Svd svd(matrix(theta), Eigen::ComputeFullU | Eigen::ComputeFullV);
     const Eigen::Vector3d s = svd.singularValues();
     const double angle = std::atan2(s[1], s[0]) + step[6];
@@ -130,6 +141,16 @@ class Fundamental final : public Projective {
   }
 
  private:
+  static constexpr double kLeastSlope = 1e-18;     // square of the second singular value of a unit matrix
+  static constexpr double kNoDeterminant = 1e-15;  // of a unit matrix
+
+  static Matrix cofactors(const Matrix& m) {
+    Matrix c;
+    c.row(0) = m.row(1).cross(m.row(2));
+    c.row(1) = m.row(2).cross(m.row(0));
+    c.row(2) = m.row(0).cross(m.row(1));
+    return c;
+  }
   static Vector9 flat(const Matrix& m) { return Eigen::Map<const Vector9>(m.data()); }
   static Eigen::Matrix3d skew(int axis) {
     Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
@@ -147,22 +168,47 @@ class Fundamental final : public Projective {
     const double size = std::sqrt((p.colwise() - mean).colwise().squaredNorm().mean());
     if (!(size > 1e-9)) return false;
     t << 1 / size, 0, -mean[0] / size, 0, 1 / size, -mean[1] / size, 0, 0, 1;
-    p = t * p;
+    p.topRows<2>() = (p.topRows<2>().colwise() - mean.head<2>()) / size;
     return true;
   }
 
-  /// Two matrices that span the null space of the seven epipolar constraints; false where it is larger.
+  /// Two matrices that span the null space of the seven epipolar constraints; false where it is larger. Elimination, each equation for the
+  /// unknown that weighs most in it: the samples are small and scaled, and a swarm takes a great many of them.
   static bool pencil(const Eigen::Matrix<double, 3, 7>& a, const Eigen::Matrix<double, 3, 7>& b, Eigen::Matrix3d* f) {
-    Eigen::Matrix<double, 9, 7> rows;  // transposed, so that the last columns of Q are what no row sees
-    for (int i = 0; i < 7; ++i) {
-      for (int r = 0; r < 3; ++r) rows.col(i).segment<3>(3 * r) = b(r, i) * a.col(i);
+    constexpr int kRows = 7, kColumns = 9;
+    constexpr double kLeastPivot = 1e-6;
+    double m[kRows][kColumns];
+    for (int i = 0; i < kRows; ++i) {
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) m[i][3 * r + c] = b(r, i) * a(c, i);
+      }
     }
-    const Eigen::ColPivHouseholderQR<Eigen::Matrix<double, 9, 7>> qr(rows);
-    if (!(std::abs(qr.matrixR()(6, 6)) > 1e-6 * std::abs(qr.matrixR()(0, 0)))) return false;
-    const Eigen::Matrix<double, 9, 9> q = qr.householderQ();
-    for (int k = 0; k < 2; ++k) {
-      const Vector9 null = q.col(7 + k);
-      f[k] = Eigen::Map<const Matrix>(null.data());
+    int unknown[kColumns] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+    for (int k = 0; k < kRows; ++k) {
+      int pivot = k;
+      for (int c = k + 1; c < kColumns; ++c) pivot = std::abs(m[k][c]) > std::abs(m[k][pivot]) ? c : pivot;
+      if (!(std::abs(m[k][pivot]) > kLeastPivot)) return false;
+      if (pivot != k) {
+        for (auto& row : m) std::swap(row[k], row[pivot]);
+        std::swap(unknown[k], unknown[pivot]);
+      }
+      for (int i = k + 1; i < kRows; ++i) {
+        const double share = m[i][k] / m[k][k];
+        for (int c = k + 1; c < kColumns; ++c) m[i][c] -= share * m[k][c];
+      }
+    }
+    for (int j = 0; j < 2; ++j) {
+      double x[kColumns] = {};
+      x[kRows + j] = 1;
+      for (int k = kRows - 1; k >= 0; --k) {
+        double sum = m[k][kRows + j];
+        for (int c = k + 1; c < kRows; ++c) sum += m[k][c] * x[c];
+        x[k] = -sum / m[k][k];
+      }
+      Vector9 null;
+      for (int c = 0; c < kColumns; ++c) null[unknown[c]] = x[c];
+      null.normalize();
+      f[j] = Eigen::Map<const Matrix>(null.data());
     }
     return true;
   }
@@ -182,9 +228,12 @@ class Fundamental final : public Projective {
     const Eigen::Vector3d second = f.col(0).cross(f.col(2)), third = f.col(1).cross(f.col(2));
     if (second.squaredNorm() > epipole.squaredNorm()) epipole = second;
     if (third.squaredNorm() > epipole.squaredNorm()) epipole = third;
-    int positive = 0;
-    for (int i = 0; i < 7; ++i) positive += epipole.cross(b.col(i)).dot(f * a.col(i)) > 0;
-    return positive == 0 || positive == 7;
+    const auto ahead = [&](int i) { return epipole.cross(b.col(i)).dot(f * a.col(i)) > 0; };
+    const bool first = ahead(0);
+    for (int i = 1; i < 7; ++i) {
+      if (ahead(i) != first) return false;
+    }
+    return true;
   }
 };
 

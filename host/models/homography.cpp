@@ -43,10 +43,10 @@ class Homography final : public Projective {
     return admit(theta);
   }
 
-  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
+  Position to_data(const Position& theta, const Frame& frame) const override {
     return position(to_image(frame, 1) * matrix(theta) * from_image(frame, 0));
   }
-  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+  Position from_data(const Position& parameters, const Frame& frame) const override {
     return position(from_image(frame, 1) * matrix(parameters) * to_image(frame, 0));
   }
 
@@ -90,7 +90,7 @@ class Homography final : public Projective {
     const Eigen::Matrix<double, 9, 9> reflection = Eigen::Matrix<double, 9, 9>::Identity() - u * u.transpose() * (2 / u.squaredNorm());
     return reflection.rightCols<8>();
   }
-  Position retract(const Position& theta, const Eigen::VectorXd& step) const override {
+  Position retract(const Position& theta, const Position& step) const override {
     Position moved = theta + basis(theta) * step;
     moved.normalize();
     return moved;

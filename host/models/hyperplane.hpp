@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "host/models/model_space.hpp"
+#include "host/models/sphere_maps.hpp"
 
 namespace swarmfit::models {
 
@@ -55,36 +56,21 @@ class Hyperplane : public ModelSpace {
       m = -m;
       offset = -offset;
     }
-    const Vector across = m - n.dot(m) * n;
-    const double sine = across.norm();
-    const double angle = std::atan2(sine, n.dot(m));
-    velocity.template head<D>() = sine > 1e-300 ? Vector(across * (angle / sine)) : Vector(Vector::Zero());
+    velocity.template head<D>() = way_between(n, m);
     velocity[D] = offset - from[D];
   }
 
   void move(Position& theta, Eigen::Ref<Eigen::VectorXd> velocity) const override {
-    const Vector n = theta.template head<D>();
-    Vector v = velocity.template head<D>();
-    v -= n.dot(v) * n;  // random factors per dimension leave the tangent space; this brings it back
-    double angle = v.norm();
-    constexpr double kQuarterTurn = 1.5707963267948966;
-    if (angle > kQuarterTurn) {
-      v *= kQuarterTurn / angle;
-      angle = kQuarterTurn;
-    }
-    if (angle > 1e-300) {
-      const Vector direction = v / angle;
-      theta.template head<D>() = (std::cos(angle) * n + std::sin(angle) * direction).normalized();
-      // Parallel transport along the geodesic: the velocity keeps its length and its angle to the way.
-      velocity.template head<D>() = angle * (std::cos(angle) * direction - std::sin(angle) * n);
-    } else {
-      velocity.template head<D>().setZero();
-    }
+    // Random factors a dimension leave the tangent space; follow() brings the velocity back into it.
+    Vector n = theta.template head<D>(), v = velocity.template head<D>();
+    follow(n, v);
+    theta.template head<D>() = n;
+    velocity.template head<D>() = v;
     theta[D] += velocity[D];
   }
 
   double distance(const Position& a, const Position& b) const override {
-    Eigen::VectorXd v(D + 1);
+    Position v(D + 1);
     difference(a, b, v);
     return v.norm();
   }
@@ -108,14 +94,14 @@ class Hyperplane : public ModelSpace {
     return covariance(moments(all, frame), theta);
   }
 
-  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
-    Eigen::VectorXd parameters = theta;
+  Position to_data(const Position& theta, const Frame& frame) const override {
+    Position parameters = theta;
     parameters[D] = theta[D] * frame.scale;
     for (int d = 0; d < D; ++d) parameters[D] -= theta[d] * frame.centre[static_cast<std::size_t>(d)];
     return parameters;
   }
 
-  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+  Position from_data(const Position& parameters, const Frame& frame) const override {
     Position theta = parameters;
     for (int d = 0; d < D; ++d) theta[D] += parameters[d] * frame.centre[static_cast<std::size_t>(d)];
     theta[D] /= frame.scale;

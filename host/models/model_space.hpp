@@ -17,8 +17,9 @@
 
 namespace swarmfit::models {
 
-/// A position: the model's parameters in the working frame. A velocity has the same number of entries.
-using Position = Eigen::VectorXd;
+/// A position: the model's parameters in the working frame. A velocity has the same number of entries. Short enough to lie in place: a swarm
+/// moves thousands of them.
+using Position = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kernels::kMaxParameters, 1>;
 
 /// Points and weights of a least-squares problem.
 struct Weighted {
@@ -67,8 +68,8 @@ class ModelSpace {
   virtual double noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double squares) const;
 
   /// Parameters in the data's frame and unit, as results and kernels take them, and back.
-  virtual Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const = 0;
-  virtual Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const = 0;
+  virtual Position to_data(const Position& theta, const Frame& frame) const = 0;
+  virtual Position from_data(const Position& parameters, const Frame& frame) const = 0;
   /// Covariance of the data-frame parameters from that of the position.
   virtual Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const = 0;
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host/models/curved_space.hpp"
+#include "host/models/sphere_maps.hpp"
 
 namespace swarmfit::models {
 
@@ -17,29 +18,15 @@ class Projective : public CurvedSpace {
 
   /// Along the great circle of the unit sphere in 9 dimensions, to whichever of M and -M is nearer.
   void difference(const Position& from, const Position& to, Eigen::Ref<Eigen::VectorXd> velocity) const override {
-    const double cosine = from.dot(to);
-    const Vector9 target = cosine < 0 ? Vector9(-to) : Vector9(to);
-    const Vector9 across = target - std::abs(cosine) * from;
-    const double sine = across.norm();
-    const double angle = std::atan2(sine, std::abs(cosine));
-    velocity = sine > 1e-300 ? Vector9(across * (angle / sine)) : Vector9(Vector9::Zero());
+    const Vector9 here = from, there = to;
+    velocity = here.dot(there) < 0 ? way_between<Vector9>(here, -there) : way_between(here, there);
   }
 
   void move(Position& theta, Eigen::Ref<Eigen::VectorXd> velocity) const override {
-    Vector9 v = velocity - theta.dot(velocity) * theta;
-    double angle = v.norm();
-    constexpr double kQuarterTurn = 1.5707963267948966;
-    if (angle > kQuarterTurn) {
-      v *= kQuarterTurn / angle;
-      angle = kQuarterTurn;
-    }
-    if (!(angle > 1e-300)) {
-      velocity.setZero();
-      return;
-    }
-    const Vector9 direction = v / angle, before = theta;
-    theta = (std::cos(angle) * before + std::sin(angle) * direction).normalized();
-    velocity = angle * (std::cos(angle) * direction - std::sin(angle) * before);  // carried along the great circle
+    Vector9 m = theta, v = velocity;
+    follow(m, v);
+    theta = m;
+    velocity = v;
   }
 
  protected:

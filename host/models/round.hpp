@@ -41,12 +41,12 @@ class Round : public CurvedSpace {
   void difference(const Position& from, const Position& to, Eigen::Ref<Eigen::VectorXd> velocity) const override { velocity = to - from; }
   void move(Position& theta, Eigen::Ref<Eigen::VectorXd> velocity) const override { theta += velocity; }
 
-  Eigen::VectorXd to_data(const Position& theta, const Frame& frame) const override {
-    Eigen::VectorXd parameters = theta * frame.scale;
+  Position to_data(const Position& theta, const Frame& frame) const override {
+    Position parameters = theta * frame.scale;
     for (int d = 0; d < D; ++d) parameters[d] += frame.centre[static_cast<std::size_t>(d)];
     return parameters;
   }
-  Position from_data(const Eigen::VectorXd& parameters, const Frame& frame) const override {
+  Position from_data(const Position& parameters, const Frame& frame) const override {
     Position theta = parameters;
     for (int d = 0; d < D; ++d) theta[d] -= frame.centre[static_cast<std::size_t>(d)];
     return theta / frame.scale;
@@ -65,7 +65,7 @@ class Round : public CurvedSpace {
     return true;
   }
   Basis basis(const Position&) const override { return Basis::Identity(D + 1, D + 1); }
-  Position retract(const Position& theta, const Eigen::VectorXd& step) const override { return theta + step; }
+  Position retract(const Position& theta, const Position& step) const override { return theta + step; }
 
  private:
   /// In units of the cloud's own spread: a rounder shape than this is flat for all that the data can tell.

@@ -32,7 +32,7 @@ Expected<> Landscape::fitness(std::span<const models::Position> positions, std::
   cutoffs_.resize(positions.size());
   costs_.resize(positions.size());
   for (std::size_t j = 0; j < positions.size(); ++j) {
-    const Eigen::VectorXd data = space_.to_data(positions[j], frame_);
+    const models::Position data = space_.to_data(positions[j], frame_);
     std::copy(data.begin(), data.end(), parameters_.begin() + static_cast<std::ptrdiff_t>(j * width));
     if (parametric) factor_[j] = deflation(positions[j]);
     // Rounded up, so that a fitness just below the best is still told exactly.
@@ -47,7 +47,7 @@ Expected<> Landscape::fitness(std::span<const models::Position> positions, std::
 }
 
 Expected<double> Landscape::loss(const models::Position& theta) {
-  const Eigen::VectorXd data = space_.to_data(theta, frame_);
+  const models::Position data = space_.to_data(theta, frame_);
   float cost = 0;
   const kernels::Loss kind = settings_.loss == Loss::truncated_l1 ? kernels::Loss::truncated_l1 : kernels::Loss::truncated_l2;
   const kernels::SwarmView one{space_.kind(), 1, std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};

@@ -22,10 +22,10 @@ Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint3
   alive_.assign(candidates.size(), 1);
 }
 
-void Sampler::prefer_unexplained(std::span<const float> caps, float full) {
+void Sampler::prefer_unexplained(std::span<const float> caps, float least) {
   live_.clear();
   for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
-    alive_[place] = caps[candidates_[place]] >= 0.5F * full ? 1 : 0;
+    alive_[place] = caps[candidates_[place]] >= least ? 1 : 0;
     if (alive_[place] != 0) live_.push_back(place);
   }
   if (live_.size() >= static_cast<std::size_t>(4 * space_.minimal_sample())) return;

@@ -21,8 +21,8 @@ class Sampler {
   /// A model through a sample. `local`: of nearby points. False if some tens of samples were all degenerate.
   bool draw(bool local, std::uint32_t round, std::uint32_t step, std::uint32_t particle, models::Position& theta) const;
 
-  /// Leaves out candidates whose cap has sunk below half of `full`, as long as enough remain.
-  void prefer_unexplained(std::span<const float> caps, float full);
+  /// Leaves out candidates whose cap has sunk below `least`, as long as enough remain.
+  void prefer_unexplained(std::span<const float> caps, float least);
 
  private:
   const models::WorkingPoints& points_;

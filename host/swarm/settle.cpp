@@ -13,15 +13,15 @@ class Views {
     parameters_.reserve(found.size());
     for (const models::Position& theta : found) {
       parameters_.push_back(ground.space.to_data(theta, ground.points.frame()));
-      const Eigen::VectorXd& row = parameters_.back();
+      const models::Position& row = parameters_.back();
       views_.push_back({ground.space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
     }
   }
   std::span<const kernels::ModelView> views() const noexcept { return views_; }
-  const Eigen::VectorXd& parameters(std::size_t m) const noexcept { return parameters_[m]; }
+  const models::Position& parameters(std::size_t m) const noexcept { return parameters_[m]; }
 
  private:
-  std::vector<Eigen::VectorXd> parameters_;
+  std::vector<models::Position> parameters_;
   std::vector<kernels::ModelView> views_;
 };
 

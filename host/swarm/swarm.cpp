@@ -100,8 +100,9 @@ void Swarm::remember() {
   }
 }
 
-const models::Position& Swarm::attractor(std::size_t particle, std::uint32_t word) const {
+const models::Position& Swarm::attractor(std::size_t particle) const {
   if (settings_.topology == Topology::roulette) {
+    const auto word = random_.words(Draw::roulette, round_, static_cast<std::uint32_t>(steps_), static_cast<std::uint32_t>(particle))[0];
     std::vector<double> shares(list_.size());
     std::transform(list_.begin(), list_.end(), shares.begin(), [](const GlobalBest& g) { return g.fitness; });
     return list_[roulette(shares, Random::unit(word))].position;
@@ -119,7 +120,7 @@ const models::Position& Swarm::attractor(std::size_t particle, std::uint32_t wor
 void Swarm::move(const Sampler& sampler) {
   const auto width = static_cast<std::size_t>(space_.parameter_count());
   const auto steps = static_cast<std::uint32_t>(steps_);
-  Eigen::VectorXd to_own(static_cast<Eigen::Index>(width)), to_best(static_cast<Eigen::Index>(width));
+  models::Position to_own(static_cast<Eigen::Index>(width)), to_best(static_cast<Eigen::Index>(width));
   models::Position before;
   const auto renewed = static_cast<std::size_t>(settings_.renewal_share * static_cast<double>(positions_.size()));
   for (std::size_t j = 0; j < positions_.size(); ++j) {
@@ -133,7 +134,7 @@ void Swarm::move(const Sampler& sampler) {
       }
     }
     space_.difference(positions_[j], own_best_[j], to_own);
-    space_.difference(positions_[j], attractor(j, random_.words(Draw::roulette, round_, steps, particle)[0]), to_best);
+    space_.difference(positions_[j], attractor(j), to_best);
     for (std::size_t d = 0; d < width; d += 2) {
       const auto words = random_.words(Draw::move, round_, steps, particle * 16 + static_cast<std::uint32_t>(d / 2));
       for (std::size_t e = d; e < std::min(d + 2, width); ++e) {

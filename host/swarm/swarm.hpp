@@ -48,7 +48,7 @@ class Swarm {
  private:
   void remember();
   void move(const Sampler& sampler);
-  const models::Position& attractor(std::size_t particle, std::uint32_t word) const;
+  const models::Position& attractor(std::size_t particle) const;
 
   const models::ModelSpace& space_;
   const Settings& settings_;
