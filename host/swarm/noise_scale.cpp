@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "host/swarm/multi_model.hpp"
-#include "host/swarm/settle.hpp"
+#include "host/swarm/refinement.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -12,7 +12,9 @@ namespace {
 constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
 constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
 constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
-constexpr int kRounds = 10;
+constexpr double kSettled = 0.05;   // relative change of the threshold below which it stays
+constexpr int kRounds = 10;         // of search
+constexpr int kSteps = 10;          // of models and threshold in turn, after each
 constexpr std::size_t kModels = 4;  // the most prominent ones tell the scale
 
 }  // namespace
@@ -44,12 +46,39 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
   return sigma;
 }
 
+namespace {
+
+/// Sigma as the models see it that the points within `tau` of them show: the weighted median, each model voting with what it holds. 0 without
+/// models.
+Expected<double> common_sigma(const Ground& ground, std::span<const models::Position> models, std::vector<float>& distances) {
+  std::vector<std::pair<double, std::size_t>> votes;
+  std::size_t total = 0;
+  for (const models::Position& theta : models) {
+    const auto evidence = weigh(ground, theta, {}, distances);
+    if (!evidence) return tl::unexpected(evidence.error());
+    const auto tau = static_cast<double>(ground.tau);
+    votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), static_cast<std::size_t>(evidence->count));
+    total += votes.back().second;
+  }
+  std::sort(votes.begin(), votes.end());
+  std::size_t below = 0;
+  for (const auto& [value, weight] : votes) {
+    below += weight;
+    if (2 * below >= total) return value;
+  }
+  return 0.0;
+}
+
+bool near(double a, double b) { return std::abs(a - b) <= kSettled * b; }
+
+}  // namespace
+
 Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
                                     const models::WorkingPoints& points, const Part& part, std::size_t finite_points,
                                     const FitOptions& options) {
   const double unit = points.frame().scale;
   double tau = kGenerous * unit;
-  std::vector<float> distances(points.size());
+  std::vector<float> distances(points.size()), caps(points.size());
   for (int round = 0; round < kRounds; ++round) {
     const Settings settings = resolve(options, finite_points, tau);
     Limits limits;
@@ -57,34 +86,29 @@ Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const 
     MultiModel search(evaluator, space, points, part, settings, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
-    const Ground ground{evaluator, space, points, static_cast<float>(tau)};
-    if (auto done = settle(ground, search.found(), result); !done) return tl::unexpected(done.error());
-    // Median over the models' points: each model votes with what it holds.
-    std::vector<std::pair<double, std::size_t>> votes;
-    std::size_t total = 0;
-    for (std::size_t m = 0; m < result.models.size(); ++m) {
-      if (auto done = weigh(ground, search.found()[m], {}, distances); !done) return tl::unexpected(done.error());
-      votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), result.models[m].inliers);
-      total += result.models[m].inliers;
-    }
-    if (votes.empty()) {  // so wide that nothing stands out from what surrounds it
+    std::vector<models::Position> found = search.found();
+    if (found.empty()) {  // so wide that nothing stands out from what surrounds it
       tau /= 2;
       continue;
     }
-    std::sort(votes.begin(), votes.end());
-    std::size_t below = 0;
-    double sigma = votes.back().first;
-    for (const auto& [value, weight] : votes) {
-      below += weight;
-      if (2 * below >= total) {
-        sigma = value;
-        break;
+    // The models follow the threshold and it follows them, without a search each time; the next search starts where they have come to.
+    const double searched = tau;
+    for (int step = 0; step < kSteps; ++step) {
+      const Ground ground{evaluator, space, points, static_cast<float>(tau)};
+      if (step > 0) {
+        for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = points.finite(i) ? ground.tau : 0.0F;
+        for (models::Position& theta : found) {
+          if (auto done = refine_one(ground, settings.loss, caps, theta); !done) return tl::unexpected(done.error());
+        }
       }
+      const auto sigma = common_sigma(ground, found, distances);
+      if (!sigma) return sigma;
+      const double next = std::max(kSigmas * *sigma, kLeast * unit);
+      const bool settled = near(next, tau);
+      tau = next;
+      if (settled) break;
     }
-    const double next = std::max(kSigmas * sigma, kLeast * unit);
-    const bool settled = std::abs(next - tau) <= 0.05 * tau;
-    tau = next;
-    if (settled) break;
+    if (near(tau, searched)) break;
   }
   return tau;
 }
