@@ -40,8 +40,7 @@ const PottsEnergy::Choice* PottsEnergy::find(std::size_t node, Label label) cons
 PottsEnergy::Cost PottsEnergy::energy(std::span<const Label> labels) const {
   Cost sum = 0;
   for (std::size_t i = 0; i < nodes(); ++i) sum += find(i, labels[i])->cost;
-  for (const Edge& e : edges_)
-    if (labels[static_cast<std::size_t>(e.i)] != labels[static_cast<std::size_t>(e.j)]) sum += e.weight;
+  for (const Edge& e : edges_) sum += apart(e.weight, labels[static_cast<std::size_t>(e.i)], labels[static_cast<std::size_t>(e.j)]);
   return sum;
 }
 
@@ -125,8 +124,8 @@ void PottsEnergy::find_takers(std::span<const std::int32_t> nodes, Piece& piece)
     for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[of_label(choice.label)->last++] = {i, choice.cost};
 }
 
-/// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. A pair costs w [l_i != l_j] at (0, 0), w at (0, 1) and (1, 0), nothing
-/// at (1, 1): half of the first on each end that keeps, and the rest on the edge (Kolmogorov and Zabih 2004). All counts twice, to stay whole.
+/// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. What a pair (i, j), i < j, costs at (x_i, x_j) is split into a part of
+/// x_i alone, V(1,0) - V(0,0), a part of x_j alone, -V(1,0), and the rest V(0,1) + V(1,0) - V(0,0) at (0, 1) (Kolmogorov and Zabih 2004).
 void PottsEnergy::set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take,
                                  std::span<const Label> labels) {
   for (std::size_t k = 0; k < part.size(); ++k) {
@@ -138,12 +137,13 @@ void PottsEnergy::set_capacities(std::span<const std::int32_t> part, Label alpha
       const auto j = static_cast<std::size_t>(head);
       const std::int32_t weight = weight_[static_cast<std::size_t>(a)];
       if (role_[j] == Role::fixed) {
-        gain += weight * (static_cast<int>(alpha != labels[j]) - static_cast<int>(own != labels[j]));
+        gain += apart(weight, alpha, labels[j]) - apart(weight, own, labels[j]);
         graph_.capacity(a) = graph_.capacity(mate) = 0;
       } else {
-        const std::int32_t apart = own != labels[j] ? weight : 0;
-        gain += i < head ? weight - apart : -weight;
-        graph_.capacity(a) = i < head ? 2 * weight - apart : 0;
+        const std::int32_t kept = apart(weight, own, labels[j]), i_takes = apart(weight, alpha, labels[j]),
+                           j_takes = apart(weight, own, alpha);
+        gain += i < head ? i_takes - kept : -j_takes;
+        graph_.capacity(a) = i < head ? i_takes + j_takes - kept : 0;
       }
     }
     graph_.terminal(i) = gain;
@@ -163,7 +163,8 @@ PottsEnergy::Cost PottsEnergy::fall_of(std::span<const std::int32_t> part, Label
       const Label other = labels[static_cast<std::size_t>(j)];
       const bool both = role_[static_cast<std::size_t>(j)] == Role::takes;
       if (both && j < i) continue;  // seen from the other end
-      fall += weight_[static_cast<std::size_t>(a)] * (static_cast<int>(own != other) - static_cast<int>(!both && alpha != other));
+      const std::int32_t weight = weight_[static_cast<std::size_t>(a)];
+      fall += apart(weight, own, other) - (both ? 0 : apart(weight, alpha, other));
     }
   }
   return fall;

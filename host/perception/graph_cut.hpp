@@ -11,7 +11,8 @@
 namespace swarmfit::perception {
 
 /// E(l) = sum_i cost_i(l_i) + sum_(i,j) w_ij [l_i != l_j]. Each node has its own list of labels it may take. Costs and weights are whole
-/// numbers, so that energies are exact; a node's dearest label and all weights at it together must stay below 2^28.
+/// numbers, so that energies are exact; a node's dearest label and all weights at it together must stay below 2^28. One label may be ground
+/// that everything else stands on: next to it a pair costs half, which leaves alpha-expansion exact (half and half again is the whole).
 class PottsEnergy {
  public:
   using Label = std::uint16_t;
@@ -25,6 +26,9 @@ class PottsEnergy {
   void add_label(Label label, Cost cost);
   /// weight >= 0; a weight of 0 is no edge.
   void add_edge(int i, int j, Cost weight);
+
+  /// Makes a label the ground. All weights must be even then.
+  void set_ground(Label label) noexcept { ground_ = label; }
 
   /// Call once after the last add, before any expansion.
   void close();
@@ -67,6 +71,11 @@ class PottsEnergy {
   };
   enum class Role : std::uint8_t { fixed, may_take, takes };
 
+  /// What a pair of labels costs at an edge of some weight.
+  std::int32_t apart(std::int32_t weight, Label a, Label b) const noexcept {
+    if (a == b) return 0;
+    return a == ground_ || b == ground_ ? weight / 2 : weight;
+  }
   std::span<const Choice> choices(std::size_t node) const;
   const Choice* find(std::size_t node, Label label) const;
   void make_graph();
@@ -80,6 +89,7 @@ class PottsEnergy {
   std::vector<std::size_t> first_;  // of each node's choices
   std::vector<Choice> choices_;
   std::vector<Edge> edges_;
+  std::int32_t ground_ = -1;  // none
   // Made by close().
   CutGraph graph_;
   std::vector<std::int32_t> weight_;  // one an arc

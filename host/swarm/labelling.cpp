@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <utility>
 
 #include "host/perception/graph_cut.hpp"
 
@@ -12,8 +14,11 @@ namespace {
 constexpr double kUnit = 4096;        // whole units of energy a point: what graph cuts count in
 constexpr float kFarthest = 2;        // tau: no point is owned from farther away
 constexpr int kAlternations = 10;     // of labels and models
-constexpr int kFailures = 12;         // proposals in all that may join and not lower the energy before the rest is let be
+constexpr int kFailures = 4;          // proposals in all that may join and not lower the energy before the rest is let be
 constexpr double kPromising = 0.5;    // of a model's price that a proposal must save before it is fitted to its points
+constexpr double kLeastFall = 1e-3;   // of the energy that counts as one
+constexpr double kHopeless = 0.5;     // of a model's price: what is dearer by that when refitted once is given up
+constexpr double kCoherent = 0.5;     // share of neighbours alike, beyond chance, from which smoothness counts in full
 constexpr int kCycles = 3;            // of expansions over all labels
 constexpr std::size_t kSmoothed = 6;  // nearest neighbours that a point would agree with
 
@@ -22,19 +27,24 @@ constexpr std::size_t kSmoothed = 6;  // nearest neighbours that a point would a
 Labelling::Labelling(const Ground& ground, const Subset& part, const models::Neighbours& neighbours, const LabelPrices& prices)
     : ground_(ground), part_(part), prices_(prices) {
   if (!(prices.smoothness > 0) || neighbours.empty()) return;
+  std::map<std::pair<int, int>, int> asked;
   for (std::size_t i = 0; i < part.index().size(); ++i) {
     const auto near = neighbours.of(i);
-    for (std::size_t k = 0; k < std::min(kSmoothed, near.size()); ++k) edges_.emplace_back(static_cast<int>(i), static_cast<int>(near[k]));
+    for (std::size_t k = 0; k < std::min(kSmoothed, near.size()); ++k) {
+      const int one = static_cast<int>(i), other = static_cast<int>(near[k]);
+      ++asked[{std::min(one, other), std::max(one, other)}];
+    }
   }
+  edges_.assign(asked.begin(), asked.end());
 }
 
 Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const models::Position> models) const {
-  std::vector<Eigen::VectorXd> parameters;
+  std::vector<models::Position> parameters;
   std::vector<kernels::ModelView> views;
   parameters.reserve(models.size());
   for (const models::Position& theta : models) {
     parameters.push_back(ground_.space.to_data(theta, ground_.points.frame()));
-    const Eigen::VectorXd& row = parameters.back();
+    const models::Position& row = parameters.back();
     views.push_back({ground_.space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
   }
   const std::size_t points = part_.index().size();
@@ -53,22 +63,39 @@ Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const mod
 void Labelling::label(State& state) const {
   perception::PottsEnergy potts;
   using Cost = perception::PottsEnergy::Cost;
-  for (std::size_t i = 0; i < part_.index().size(); ++i) {
+  const std::size_t points = part_.index().size(), models = state.models.size();
+  potts.reserve(points, points * (models + 1), edges_.size());
+  std::vector<std::uint16_t> nearest(points, 0);
+  for (std::size_t i = 0; i < points; ++i) {
     potts.add_node();
     potts.add_label(0, static_cast<Cost>(kUnit));
-    for (std::size_t m = 0; m < state.models.size(); ++m) {
+    bool may_stay = false;
+    float least = 1;
+    for (std::size_t m = 0; m < models; ++m) {
       const float far = state.distances[m][i] / ground_.tau;
       if (!(far <= kFarthest)) continue;
-      potts.add_label(static_cast<std::uint16_t>(m + 1), static_cast<Cost>(kUnit * static_cast<double>(far)));
+      const auto label = static_cast<std::uint16_t>(m + 1);
+      potts.add_label(label, static_cast<Cost>(kUnit * static_cast<double>(far)));
+      may_stay = may_stay || (i < state.labels.size() && state.labels[i] == label);
+      if (far < least) {
+        least = far;
+        nearest[i] = label;
+      }
     }
+    if (may_stay) nearest[i] = state.labels[i];
   }
-  for (const auto& [i, j] : edges_) potts.add_edge(i, j, static_cast<Cost>(kUnit * prices_.smoothness));
+  // Gross outliers lie anywhere: a neighbour of theirs is not as odd as one that follows another model.
+  potts.set_ground(0);
+  for (const auto& [ends, count] : edges_) {
+    potts.add_edge(ends.first, ends.second, count * 2 * static_cast<Cost>(kUnit * prices_.smoothness / 2));
+  }
   potts.close();
-  std::vector<std::uint16_t> order(state.models.size() + 1);
-  std::iota(order.begin(), order.end(), std::uint16_t{0});
-  state.labels = potts.cheapest();
-  if (!edges_.empty()) potts.minimise(order, kCycles, state.labels);
-  state.energy = static_cast<double>(potts.energy(state.labels)) / kUnit + prices_.model * static_cast<double>(state.models.size());
+  // The newest model first: where labels are known already it is the one that changes them.
+  std::vector<std::uint16_t> order(models + 1);
+  std::iota(order.rbegin(), order.rend(), std::uint16_t{0});
+  state.labels = std::move(nearest);
+  if (!edges_.empty()) potts.minimise(order, kCycles, state.labels, 1);
+  state.energy = static_cast<double>(potts.energy(state.labels)) / kUnit + prices_.model * static_cast<double>(models);
 }
 
 Expected<bool> Labelling::refit(State& state) const {
@@ -86,80 +113,91 @@ Expected<bool> Labelling::refit(State& state) const {
   if (!distances) return tl::unexpected(distances.error());
   next.distances = std::move(*distances);
   label(next);
-  if (!(next.energy < state.energy - 1e-3)) return false;
+  if (!(next.energy < state.energy - kLeastFall)) return false;
   state = std::move(next);
   return true;
 }
 
-Expected<> Labelling::alternate(State& state) const {
+Expected<> Labelling::alternate(State& state, double hopeless) const {
   for (int round = 0; round < kAlternations; ++round) {
     auto better = refit(state);
     if (!better) return tl::unexpected(better.error());
-    if (!*better) break;
+    if (!*better || state.energy > hopeless) break;
   }
   return {};
 }
 
-Expected<bool> Labelling::drop_one(State& state) {
+Expected<bool> Labelling::drop_one() {
   // The one that costs least to do without, judged before its neighbours adapt.
   State best;
-  std::size_t worst = state.models.size();
-  for (std::size_t m = 0; m < state.models.size(); ++m) {
-    State without = state;
+  std::size_t worst = state_.models.size();
+  for (std::size_t m = 0; m < state_.models.size(); ++m) {
+    State without = state_;
     without.models.erase(without.models.begin() + static_cast<std::ptrdiff_t>(m));
     without.distances.erase(without.distances.begin() + static_cast<std::ptrdiff_t>(m));
+    for (std::uint16_t& l : without.labels) {
+      if (l == m + 1) l = 0;
+      if (l > m + 1) --l;
+    }
     label(without);
-    if (worst == state.models.size() || without.energy < best.energy) {
+    if (worst == state_.models.size() || without.energy < best.energy) {
       best = std::move(without);
       worst = m;
     }
   }
-  if (worst == state.models.size()) return false;
+  if (worst == state_.models.size()) return false;
   if (auto done = alternate(best); !done) return tl::unexpected(done.error());
-  if (!(best.energy < state.energy)) return false;
-  state = std::move(best);
+  if (!(best.energy < state_.energy)) return false;
+  state_ = std::move(best);
   kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(worst));
   return true;
 }
 
-std::vector<double> Labelling::costs(const State& state) const {
-  std::vector<double> cost(part_.index().size(), 1.0);
-  for (std::size_t i = 0; i < cost.size(); ++i) {
-    if (state.labels[i] == 0) continue;
-    const double far = static_cast<double>(state.distances[state.labels[i] - 1U][i] / ground_.tau);
-    cost[i] = far;
+Expected<> Labelling::drop() {
+  for (;;) {
+    auto dropped = drop_one();
+    if (!dropped) return tl::unexpected(dropped.error());
+    if (!*dropped) return {};
   }
-  return cost;
 }
 
-Expected<bool> Labelling::try_one(State& state, const models::Position& proposal, std::span<const float> distances) {
-  State with = state;
+double Labelling::cost(std::size_t point) const {
+  const std::uint16_t label = state_.labels[point];
+  return label == 0 ? 1.0 : static_cast<double>(state_.distances[label - 1U][point] / ground_.tau);
+}
+
+void Labelling::costs(std::span<float> costs) const {
+  for (std::size_t i = 0; i < part_.index().size(); ++i) costs[part_.index()[i]] = static_cast<float>(std::min(1.0, cost(i)));
+}
+
+Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<const float> distances) {
+  State with = state_;
   with.models.push_back(proposal);
   with.distances.emplace_back(distances.begin(), distances.end());
   label(with);
-  if (auto done = alternate(with); !done) return tl::unexpected(done.error());
-  if (!(with.energy < state.energy - 1e-3)) return false;
-  state = std::move(with);
+  if (auto done = alternate(with, state_.energy + kHopeless * prices_.model); !done) return tl::unexpected(done.error());
+  if (!(with.energy < state_.energy - kLeastFall)) return false;
+  state_ = std::move(with);
   kept_.push_back(kJoined);
   return true;
 }
 
-Expected<> Labelling::add(State& state, std::span<const models::Position> proposals) {
+Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
   auto measured = measure(proposals);
   if (!measured) return tl::unexpected(measured.error());
   const std::vector<std::vector<float>>& distances = *measured;
   std::vector<std::uint8_t> open(proposals.size(), 1);
+  std::vector<float> now(part_.index().size());
+  bool any = false;
   for (int failures = 0; failures < kFailures;) {
-    const std::vector<double> cost = costs(state);
+    for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
     std::size_t best = proposals.size();
     double most = kPromising * prices_.model;
     for (std::size_t p = 0; p < proposals.size(); ++p) {
       if (open[p] == 0) continue;
       double gain = 0;
-      for (std::size_t i = 0; i < cost.size(); ++i) {
-        const double far = static_cast<double>(distances[p][i] / ground_.tau);
-        gain += std::max(0.0, cost[i] - far);  // NaN gains nothing
-      }
+      for (std::size_t i = 0; i < now.size(); ++i) gain += distances[p][i] < now[i] ? static_cast<double>(now[i] - distances[p][i]) : 0.0;
+      gain /= static_cast<double>(ground_.tau);
       if (gain < kPromising * prices_.model) open[p] = 0;
       if (gain > most) {
         most = gain;
@@ -168,41 +206,49 @@ Expected<> Labelling::add(State& state, std::span<const models::Position> propos
     }
     if (best == proposals.size()) break;
     open[best] = 0;
-    auto joined = try_one(state, proposals[best], distances[best]);
+    auto joined = try_one(proposals[best], distances[best]);
     if (!joined) return tl::unexpected(joined.error());
+    any = any || *joined;
     failures += *joined ? 0 : 1;
   }
-  return {};
+  return any;
 }
 
-Expected<> Labelling::settle(std::vector<models::Position>& models, std::span<const models::Position> proposals) {
-  State state;
-  state.models = models;
+Expected<> Labelling::start(std::span<const models::Position> models) {
+  state_ = {};
+  state_.models.assign(models.begin(), models.end());
   auto distances = measure(models);
   if (!distances) return tl::unexpected(distances.error());
-  state.distances = std::move(*distances);
+  state_.distances = std::move(*distances);
   kept_.resize(models.size());
   std::iota(kept_.begin(), kept_.end(), std::size_t{0});
-  label(state);
+  const double wanted = std::exchange(prices_.smoothness, 0.0);
+  label(state_);
+  // Where models run through each other neighbours tell nothing, and agreement among them must not be asked for.
+  prices_.smoothness = wanted * std::min(1.0, coherence() / kCoherent);
+  label(state_);
+  return alternate(state_);
+}
 
-  if (auto done = alternate(state); !done) return done;
-
-  if (auto done = add(state, proposals); !done) return done;
-
-  for (;;) {
-    auto dropped = drop_one(state);
-    if (!dropped) return tl::unexpected(dropped.error());
-    if (!*dropped) break;
+double Labelling::coherence() const {
+  const std::size_t points = state_.labels.size();
+  std::vector<std::size_t> owned(state_.models.size() + 1, 0);
+  for (const std::uint16_t l : state_.labels) ++owned[l];
+  double alike = 0, by_chance = 0, asked = 0;
+  for (const auto& [ends, count] : edges_) {
+    const std::uint16_t one = state_.labels[static_cast<std::size_t>(ends.first)],
+                        other = state_.labels[static_cast<std::size_t>(ends.second)];
+    if (one == 0 && other == 0) continue;
+    asked += count;
+    alike += one == other ? count : 0;
+    by_chance += count * static_cast<double>(owned[one == 0 ? other : one]) / static_cast<double>(points);
   }
-  models = std::move(state.models);
-  labels_ = std::move(state.labels);
-  energy_ = state.energy;
-  return {};
+  return asked > by_chance ? std::max(0.0, (alike - by_chance) / (asked - by_chance)) : 1.0;
 }
 
 void Labelling::write(std::span<std::uint16_t> labels) const {
   std::fill(labels.begin(), labels.end(), std::uint16_t{0});
-  for (std::size_t i = 0; i < labels_.size(); ++i) labels[part_.index()[i]] = labels_[i];
+  for (std::size_t i = 0; i < state_.labels.size(); ++i) labels[part_.index()[i]] = state_.labels[i];
 }
 
 }  // namespace swarmfit::swarm

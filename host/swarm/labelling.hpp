@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -17,7 +18,8 @@ namespace swarmfit::swarm {
 
 /// Energy of a labelling l and models theta (PEaRL; Isack and Boykov 2012):
 ///
-///   E = sum_i D_i(l_i) + smoothness sum_(i,j) [l_i != l_j] + model |{l_i}|,  D_i(k) = d_ik / tau_i where d_ik <= 2 tau_i, D_i(0) = 1
+///   E = sum_i D_i(l_i) + smoothness sum_(i,j) V(l_i, l_j) + model |{l_i}|,  D_i(k) = d_ik / tau_i where d_ik <= 2 tau_i, D_i(0) = 1,
+///   V(k, l) = [k != l], half that where one of them is 0
 ///
 /// Alternates labels (alpha-expansion) and least squares on each model's own points, and drops a model where that saves more than it
 /// explains; the energy never rises. Labels: 0 none, k the k-th of `models`, one a point of the cloud.
@@ -26,12 +28,20 @@ class Labelling {
   /// `part` must hold every finite point of the cloud.
   Labelling(const Ground& ground, const Subset& part, const models::Neighbours& neighbours, const LabelPrices& prices);
 
-  /// `proposals`: positions that might be models as well; they join where that lowers the energy.
-  Expected<> settle(std::vector<models::Position>& models, std::span<const models::Position> proposals);
-  /// For each model that came out its place in the list given to settle, or kJoined for a proposal.
+  /// Shares the points out among `models` and refits these.
+  Expected<> start(std::span<const models::Position> models);
+  /// Takes in those of the proposals that lower the energy; true if there were any.
+  Expected<bool> offer(std::span<const models::Position> proposals);
+  /// Drops models while that lowers the energy.
+  Expected<> drop();
+
+  const std::vector<models::Position>& models() const noexcept { return state_.models; }
+  /// What each point of the cloud costs as things stand, in units of tau: 1 where no model owns it. Others keep their value.
+  void costs(std::span<float> costs) const;
+  /// For each model its place in the list given to start, or kJoined for a proposal.
   static constexpr std::size_t kJoined = static_cast<std::size_t>(-1);
   const std::vector<std::size_t>& kept() const noexcept { return kept_; }
-  double energy() const noexcept { return energy_; }
+  double energy() const noexcept { return state_.energy; }
   void write(std::span<std::uint16_t> labels) const;
 
  private:
@@ -44,21 +54,23 @@ class Labelling {
 
   /// Of each model to each point of the part.
   Expected<std::vector<std::vector<float>>> measure(std::span<const models::Position> models) const;
+  /// The labels of the state's models, from those it has where they may stay; and the energy.
   void label(State& state) const;
   Expected<bool> refit(State& state) const;
-  Expected<bool> drop_one(State& state);
-  Expected<> add(State& state, std::span<const models::Position> proposals);
-  Expected<bool> try_one(State& state, const models::Position& proposal, std::span<const float> distances);
-  std::vector<double> costs(const State& state) const;
-  Expected<> alternate(State& state) const;
+  Expected<bool> drop_one();
+  Expected<bool> try_one(const models::Position& proposal, std::span<const float> distances);
+  double cost(std::size_t point) const;
+  /// How much more alike neighbours are than chance would have it, in [0, 1], over the edges at points that models own.
+  double coherence() const;
+  /// Labels and models in turn while the energy falls, or until it is found above `hopeless`.
+  Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity()) const;
 
   const Ground& ground_;
   const Subset& part_;
   LabelPrices prices_;
-  std::vector<std::pair<int, int>> edges_;  // each pair once for each of the two that asks for it
+  std::vector<std::pair<std::pair<int, int>, int>> edges_;  // two points, and how many of them ask for the other
+  State state_;
   std::vector<std::size_t> kept_;
-  std::vector<std::uint16_t> labels_;
-  double energy_ = 0;
 };
 
 }  // namespace swarmfit::swarm

@@ -12,9 +12,11 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
-constexpr int kMostRounds = 8;    // of refinement
-constexpr int kFullRounds = 1;    // of refinement on all points, where it was done on a part of them before
+constexpr double kStable = 0.01;      // spread of the list of global bests, as a share of the scale, below which it is stable
+constexpr float kUnexplained = 0.5F;  // of tau: points whose cap is at least that are sampled from
+constexpr int kMostRounds = 8;        // of refinement
+constexpr float kSharper[] = {0.03F, 0.01F, 0.003F};  // corners, one after another, where points are few
+constexpr int kFullRounds = 1;                        // of refinement on all points, where it was done on a part of them before
 
 }  // namespace
 
@@ -72,14 +74,14 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     if (space_.admit(theta)) seeds.push_back(std::move(theta));
   }
   int unpaid = 0;
-  for (std::uint32_t round = 0; stop_reason_.empty(); ++round) {
+  while (stop_reason_.empty()) {
     if (limits_.max_models > 0 && found_.size() >= limits_.max_models) {
       stop_reason_ = "max-models reached";
       break;
     }
     models::Position theta;
     double loss = 0;
-    auto outcome = search(round, seeds, theta, loss);
+    auto outcome = search(round_++, seeds, theta, loss);
     if (!outcome) return tl::unexpected(outcome.error());
     if (*outcome == Outcome::interrupted) break;
     if (*outcome == Outcome::found) {
@@ -109,25 +111,32 @@ double MultiModel::loss_of_nothing() const {
   return sum;
 }
 
-Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta,
-                                                 double& loss) {
+Expected<bool> MultiModel::fly(Swarm& swarm, std::uint32_t round, std::span<const models::Position> seeds, float alive) {
   Sampler sampler(points_, part_.index(), neighbours_, space_, random_);
-  sampler.prefer_unexplained(caps_, static_cast<float>(settings_.threshold));
+  sampler.prefer_unexplained(caps_, alive);
   scale_ = loss_of_nothing();
-  Swarm swarm(space_, settings_, random_);
   steps_ = 0;
   if (!swarm.start(sampler, round, seeds)) {
     stop_reason_ = "complete: what is left determines no model";
-    return Outcome::interrupted;
+    return false;
   }
   while (!swarm.converged() && swarm.steps() < settings_.iterations) {
     if (auto reason = interrupted()) {
       stop_reason_ = *reason;
-      return Outcome::interrupted;
+      return false;
     }
     if (auto done = swarm.step(landscape_, sampler, scale_); !done) return tl::unexpected(done.error());
   }
   steps_ = static_cast<std::size_t>(swarm.steps());
+  return true;
+}
+
+Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta,
+                                                 double& loss) {
+  Swarm swarm(space_, settings_, random_);
+  auto flown = fly(swarm, round, seeds, kUnexplained * tau_);
+  if (!flown) return tl::unexpected(flown.error());
+  if (!*flown) return Outcome::interrupted;
   theta = swarm.best();
   if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
   if (auto done = refine(theta, loss); !done) return tl::unexpected(done.error());
@@ -195,9 +204,42 @@ Expected<> MultiModel::finish(FitResult& result) {
 
 bool MultiModel::shares_out() const noexcept { return settings_.joint && !part_searched_ && settings_.prices.smoothness > 0; }
 
+Expected<> MultiModel::search_further(Labelling& labelling) {
+  // Swarms look for what lowers the joint energy: each point may still save what it costs now. Two models that the first search took for
+  // one come apart here, and what was too little to be seen beside the large ones is seen.
+  constexpr float kAnyPoint = 0;
+  const std::string before = stop_reason_;
+  while (!interrupted()) {
+    std::fill(caps_.begin(), caps_.end(), 0.0F);
+    labelling.costs(caps_);
+    for (float& cap : caps_) cap *= tau_;
+    if (auto done = show_caps(); !done) return done;
+    Swarm swarm(space_, settings_, random_);
+    auto flown = fly(swarm, round_++, {}, kAnyPoint);
+    if (!flown) return tl::unexpected(flown.error());
+    if (!*flown) {
+      if (!interrupted()) stop_reason_ = before;
+      return {};
+    }
+    models::Position theta = swarm.best();
+    double loss = 0;
+    if (auto done = refine(theta, loss); !done) return done;
+    std::vector<models::Position> proposals(swarm.own_bests().begin(), swarm.own_bests().end());
+    proposals.push_back(std::move(theta));
+    auto joined = labelling.offer(proposals);
+    if (!joined) return tl::unexpected(joined.error());
+    if (!*joined) return {};
+  }
+  return {};
+}
+
 Expected<> MultiModel::share_out(FitResult& result) {
   Labelling labelling(ground_, part_, neighbours_, settings_.prices);
-  if (auto done = labelling.settle(found_, proposals_); !done) return done;
+  if (auto done = labelling.start(found_); !done) return done;
+  if (auto joined = labelling.offer(proposals_); !joined) return tl::unexpected(joined.error());
+  if (auto done = search_further(labelling); !done) return done;
+  if (auto done = labelling.drop(); !done) return done;
+  found_ = labelling.models();
   std::vector<Model> kept;
   for (const std::size_t m : labelling.kept()) {
     kept.emplace_back();
@@ -217,6 +259,15 @@ Expected<> MultiModel::polish() {
   restore_caps();
   for (models::Position& theta : found_) {
     if (auto done = refine_one(ground_, settings_.loss, caps_, theta, full_rounds()); !done) return tl::unexpected(done.error());
+  }
+  if (part_searched_ || settings_.loss != Loss::truncated_l1 || shares_out()) return {};
+  // Few points leave the least absolute deviations well apart from what rounded corners make of them.
+  Ground sharp = ground_;
+  for (const float corner : kSharper) {
+    sharp.corner = corner;
+    for (models::Position& theta : found_) {
+      if (auto done = refine_one(sharp, settings_.loss, caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
+    }
   }
   return {};
 }

@@ -18,6 +18,9 @@
 
 namespace swarmfit::swarm {
 
+class Labelling;
+class Swarm;
+
 using Clock = std::chrono::steady_clock;
 
 /// When to end early.
@@ -46,12 +49,15 @@ class MultiModel {
   enum class Outcome { found, unpaid, complete, interrupted };
 
   Expected<Outcome> search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta, double& loss);
+  /// Flies one swarm over the caps as they are; false if it ended early. Samples are of points whose cap is at least `alive`.
+  Expected<bool> fly(Swarm& swarm, std::uint32_t round, std::span<const models::Position> seeds, float alive);
   Expected<> refine(models::Position& theta, double& loss);
   Expected<bool> accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate();
   Expected<> finish(FitResult& result);
   Expected<> polish();
   Expected<> share_out(FitResult& result);
+  Expected<> search_further(Labelling& labelling);
   Expected<> drop_unpaid(FitResult& result);
   std::optional<std::string> interrupted() const;
   void restore_caps();
@@ -82,6 +88,7 @@ class MultiModel {
   std::vector<std::uint16_t> labels_;
   double scale_ = 0;  // loss of a model that explains nothing
   std::size_t steps_ = 0;
+  std::uint32_t round_ = 0;  // swarms flown so far
   std::string stop_reason_;
 };
 

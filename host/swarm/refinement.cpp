@@ -6,7 +6,6 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr float kCorner = 0.1F;       // of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
 
 /// Does the refinement need to know each point's distance, beside what a pass tells?
@@ -41,18 +40,18 @@ Expected<double> joint_energy(const Ground& ground, const std::vector<models::Po
 
 Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
                                   std::span<float> distances) {
-  const Eigen::VectorXd data = ground.space.to_data(theta, ground.points.frame());
+  const models::Position data = ground.space.to_data(theta, ground.points.frame());
   const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
   kernels::Evidence evidence;
   const auto done =
-      ground.evaluator.weigh(ground.view(), {ground.tau, kCorner, caps}, std::span(&model, 1), distances, std::span(&evidence, 1));
+      ground.evaluator.weigh(ground.view(), {ground.tau, ground.corner, caps}, std::span(&model, 1), distances, std::span(&evidence, 1));
   if (!done) return tl::unexpected(to_error(done.error()));
   return evidence;
 }
 
 Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
   std::vector<kernels::Evidence> evidence(models.size());
-  if (auto done = ground.evaluator.weigh(ground.view(), {ground.tau, kCorner, {}}, models, {}, evidence); !done) {
+  if (auto done = ground.evaluator.weigh(ground.view(), {ground.tau, ground.corner, {}}, models, {}, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
   return evidence;
@@ -68,7 +67,7 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
     const float d = distances[i];
     if (!(d <= ground.tau) || (!caps.empty() && d > caps[i])) continue;
     index.push_back(ground.index(i));
-    weight.push_back(1.0 / static_cast<double>(std::max(d / ground.tau, kCorner)));
+    weight.push_back(1.0 / static_cast<double>(std::max(d / ground.tau, ground.corner)));
   }
   return ground.space.refine(ground.points, {index, weight}, theta);
 }

@@ -18,6 +18,7 @@ struct Ground {
   const models::WorkingPoints& points;
   float tau;  ///< [data unit]
   const Subset* part = nullptr;
+  float corner = 0.1F;  ///< of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 
   std::size_t size() const noexcept { return part != nullptr ? part->index().size() : points.size(); }
   kernels::PointsView view() const noexcept { return part != nullptr ? part->view() : points.view(); }

@@ -85,7 +85,7 @@ Settings for_kind(Settings s, ModelType type) {
   // In eight dimensions flight settles slowly; and points of one surface or body lie together in both images.
   s.renewal_share = 0.75;
   s.patience = 2;
-  s.prices = type == ModelType::homography ? LabelPrices{0.1, 7} : LabelPrices{0.2, 10};
+  s.prices = type == ModelType::homography ? LabelPrices{0.2, 7} : LabelPrices{0.25, 6};
   return s;
 }
 
