@@ -22,15 +22,19 @@ packages=(
   python3-skimage
 )
 lint_packages=(clang-format clang-tidy)
+# the peers of bench/, and what plots their figures
+bench_packages=(libpcl-dev libopen3d-dev libcgal-dev python3-matplotlib)
 
 usage() {
-  echo "usage: tools/setup.sh [--lint]"
-  echo "  --lint  also the packages of tools/lint.sh: ${lint_packages[*]}"
+  echo "usage: tools/setup.sh [--lint] [--bench]"
+  echo "  --lint   also the packages of tools/lint.sh: ${lint_packages[*]}"
+  echo "  --bench  also those of tools/performance.sh, some gigabytes: ${bench_packages[*]}"
 }
 
 for argument in "$@"; do
   case "$argument" in
     --lint) packages+=("${lint_packages[@]}") ;;
+    --bench) packages+=("${bench_packages[@]}") ;;
     -h|--help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
   esac
