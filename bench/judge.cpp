@@ -10,7 +10,8 @@ namespace swarmfit::peers {
 namespace {
 
 constexpr std::size_t kSamples = 20000;
-constexpr std::size_t kNeighbours = 80;  // enough to see a surface through a depth camera's noise
+// A neighbourhood is 40 of at most so many points, spread evenly: wide enough to see a surface through a depth camera's noise.
+constexpr std::size_t kLookedAt = 40000, kNeighbours = 40;
 
 /// What nanoflann asks of points.
 struct Points {
@@ -38,7 +39,13 @@ Judge::Judge(const Scene& scene, const Task& task) : scene_(scene), task_(task) 
 }
 
 void Judge::estimate_normals() {
-  const Points points{scene_.points};
+  std::vector<float> spread;
+  const std::size_t count = scene_.size(), looked_at = std::min(count, kLookedAt);
+  for (std::size_t k = 0; k < looked_at; ++k) {
+    const float* x = scene_.points.data() + 3 * (k * count / looked_at);
+    spread.insert(spread.end(), x, x + 3);
+  }
+  const Points points{spread};
   Tree tree(3, points, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   tree.buildIndex();
   std::vector<std::uint32_t> near(kNeighbours);
@@ -47,8 +54,7 @@ void Judge::estimate_normals() {
     const std::size_t found = tree.knnSearch(scene_.points.data() + std::size_t{3} * sample, kNeighbours, near.data(), squares.data());
     Eigen::Matrix3Xd around(3, static_cast<Eigen::Index>(found));
     for (std::size_t k = 0; k < found; ++k) {
-      around.col(static_cast<Eigen::Index>(k)) =
-          Eigen::Map<const Eigen::Vector3f>(scene_.points.data() + std::size_t{3} * near[k]).cast<double>();
+      around.col(static_cast<Eigen::Index>(k)) = Eigen::Map<const Eigen::Vector3f>(spread.data() + std::size_t{3} * near[k]).cast<double>();
     }
     around.colwise() -= around.rowwise().mean().eval();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(around * around.transpose());
