@@ -40,8 +40,13 @@ class CgalRansac final : public Contender {
     for (const auto& shape : ransac.shapes()) {
       const auto* plane = dynamic_cast<const PlaneShape*>(shape.get());
       if (plane == nullptr) continue;
-      found.planes.push_back(to_plane(static_cast<Kernel::Plane_3>(*plane)));
-      for (const std::size_t i : plane->indices_of_assigned_points()) found.labels[i] = static_cast<std::uint16_t>(found.planes.size());
+      const auto surface = static_cast<Kernel::Plane_3>(*plane);
+      found.planes.push_back(to_plane(surface));
+      // It assigns points up to three times its epsilon away; those beyond the threshold are left unlabelled.
+      for (const std::size_t i : plane->indices_of_assigned_points()) {
+        if (CGAL::squared_distance(points_[i].first, surface) > task_.threshold * task_.threshold) continue;
+        found.labels[i] = static_cast<std::uint16_t>(found.planes.size());
+      }
     }
     return found;
   }
