@@ -37,11 +37,11 @@ class CgalGrowing final : public Contender {
     for (const auto& members : regions) {
       std::vector<Kernel::Point_3> held;
       held.reserve(members.size());
-      for (const std::size_t i : members) held.push_back(points_[i].first);
+      for (const std::size_t i : members) held.push_back(std::get<0>(points_[i]));
       Kernel::Plane_3 plane;
       CGAL::linear_least_squares_fitting_3(held.begin(), held.end(), plane, CGAL::Dimension_tag<0>());
       found.planes.push_back(to_plane(plane));
-      for (const std::size_t i : members) found.labels[i] = static_cast<std::uint16_t>(found.planes.size());
+      for (const std::size_t i : members) found.labels[std::get<2>(points_[i])] = static_cast<std::uint16_t>(found.planes.size());
     }
     return found;
   }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <chrono>
-#include <utility>
+#include <tuple>
 #include <vector>
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -14,9 +14,10 @@
 namespace swarmfit::peers {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using PointWithNormal = std::pair<Kernel::Point_3, Kernel::Vector_3>;
-using PointMap = CGAL::First_of_pair_property_map<PointWithNormal>;
-using NormalMap = CGAL::Second_of_pair_property_map<PointWithNormal>;
+/// With its place in the input: Efficient RANSAC rearranges what it is given.
+using PointWithNormal = std::tuple<Kernel::Point_3, Kernel::Vector_3, std::uint32_t>;
+using PointMap = CGAL::Nth_of_tuple_property_map<0, PointWithNormal>;
+using NormalMap = CGAL::Nth_of_tuple_property_map<1, PointWithNormal>;
 using Points = std::vector<PointWithNormal>;
 
 inline constexpr unsigned kNormalNeighbours = 12;
@@ -25,7 +26,8 @@ inline Points cgal_points(const Scene& scene) {
   Points points;
   points.reserve(scene.size());
   for (std::size_t i = 0; i + 2 < scene.points.size(); i += 3) {
-    points.emplace_back(Kernel::Point_3(scene.points[i], scene.points[i + 1], scene.points[i + 2]), Kernel::Vector_3(0, 0, 1));
+    points.emplace_back(Kernel::Point_3(scene.points[i], scene.points[i + 1], scene.points[i + 2]), Kernel::Vector_3(0, 0, 1),
+                        static_cast<std::uint32_t>(i / 3));
   }
   return points;
 }

@@ -44,8 +44,8 @@ class CgalRansac final : public Contender {
       found.planes.push_back(to_plane(surface));
       // It assigns points up to three times its epsilon away; those beyond the threshold are left unlabelled.
       for (const std::size_t i : plane->indices_of_assigned_points()) {
-        if (CGAL::squared_distance(points_[i].first, surface) > task_.threshold * task_.threshold) continue;
-        found.labels[i] = static_cast<std::uint16_t>(found.planes.size());
+        if (CGAL::squared_distance(std::get<0>(points_[i]), surface) > task_.threshold * task_.threshold) continue;
+        found.labels[std::get<2>(points_[i])] = static_cast<std::uint16_t>(found.planes.size());
       }
     }
     return found;
