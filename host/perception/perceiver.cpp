@@ -25,6 +25,7 @@ using perception::PointGrid;
 using perception::Surface;
 
 constexpr std::size_t kPlanesOfFirstView = 6;  // enough to see which direction the room's planes share
+constexpr int kStall = 5;                      // still steps that end a swarm
 constexpr double kStereoThreshold = 0.015;     // [m] unless one is given: matching is coarser than a depth camera
 constexpr double kStereoAngle = 0.01;          // [rad] from the first view's ground
 constexpr double kStereoAngleFromWall = 0.06;  // [rad] the vertical is less sure then
@@ -83,6 +84,8 @@ struct Perceiver::State {
 
 FitOptions Perceiver::State::fit_options() const {
   FitOptions fit = options.fit;
+  // Surfaces are refined on all points afterwards: a swarm need not settle.
+  if (fit.preset == Preset::fast && !fit.stall) fit.stall = kStall;
   if (!vertical) {
     fit.prior.reset();
     fit.max_models = kPlanesOfFirstView;

@@ -11,21 +11,28 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr double kNormalSlack = 0.35;    // [rad] normals of cells are noisy
-constexpr float kAlong = 0.9f;           // cosine: a cell whose normal is farther off does not lie in the plane
-constexpr double kAgreement = 0.5;       // share of a plane's cells that lie along it; less is clutter cut by a slab
-constexpr double kContrast = 2;          // of the density in a surface to that around it
-constexpr std::size_t kFewCells = 10;    // fewer flat cells hold no surface
-constexpr float kFringeOfPlane = 0.06f;  // [m] a surface reaches this far beyond the cells that tell its direction
-constexpr float kNoise = 0.0045f;        // [1 / m] three deviations of a depth, over the range squared
-constexpr int kPointsAtOnce = 16384;     // of a range that one thread works on
-constexpr double kExtentMargin = 0.02;   // [m] things stand a little over the edge of what is seen of a table
+constexpr double kNormalSlack = 0.35;             // [rad] normals of cells are noisy
+constexpr float kAlong = 0.9f;                    // cosine: a cell whose normal is farther off does not lie in the plane
+constexpr double kAgreement = 0.5;                // share of a plane's cells that lie along it; less is clutter cut by a slab
+constexpr double kContrast = 2;                   // of the density in a surface to that around it
+constexpr std::size_t kCellsForDirection = 4096;  // at most, that planes of any direction are fitted to: the vertical needs no more
+constexpr std::size_t kCellsForSurfaces = 8192;   // and level ones, which are refined on all points afterwards
+constexpr std::size_t kFewCells = 10;             // fewer flat cells hold no surface
+constexpr float kFringeOfPlane = 0.06f;           // [m] a surface reaches this far beyond the cells that tell its direction
+constexpr float kNoise = 0.0045f;                 // [1 / m] three deviations of a depth, over the range squared
+constexpr int kPointsAtOnce = 16384;              // of a range that one thread works on
+constexpr double kExtentMargin = 0.02;            // [m] things stand a little over the edge of what is seen of a table
 
-/// The cells as a cloud for the fitter.
-std::vector<float> gather(const Overview& overview, const std::vector<std::uint32_t>& chosen) {
+/// The cells as a cloud for the fitter; `most` of them, evenly drawn, where there are more and their normals keep clutter away. Stereo's
+/// small supports need every cell.
+std::vector<float> gather(const Overview& overview, const std::vector<std::uint32_t>& chosen, std::size_t most) {
+  const std::size_t count = overview.has_normals() ? std::min(chosen.size(), most) : chosen.size();
   std::vector<float> values;
-  values.reserve(3 * chosen.size());
-  for (const auto i : chosen) values.insert(values.end(), overview.cells.points[i].data(), overview.cells.points[i].data() + 3);
+  values.reserve(3 * count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Eigen::Vector3f& p = overview.cells.points[chosen[k * chosen.size() / count]];
+    values.insert(values.end(), p.data(), p.data() + 3);
+  }
   return values;
 }
 
@@ -249,7 +256,7 @@ void erase_models(FitResult& fit, std::vector<Surface>& surfaces, std::size_t le
 Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const std::stop_token& stop) {
   const auto flat = flat_cells(overview);
   if (overview.has_normals() && flat.size() < kFewCells) return nothing(fitter, overview.cells.size());
-  const auto values = gather(overview, flat);
+  const auto values = gather(overview, flat, kCellsForDirection);
   auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), {}, stop);
   if (!fitted) return tl::unexpected(fitted.error());
   for (auto& model : fitted->models) {
@@ -270,8 +277,9 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
     search.fit.finite_points = grid.finite;
     return search;
   }
-  const auto values = gather(overview, flat);
-  const double block = static_cast<double>(overview.stride) * static_cast<double>(overview.stride);
+  const auto values = gather(overview, flat, kCellsForSurfaces);
+  const double block = static_cast<double>(overview.stride) * static_cast<double>(overview.stride) * static_cast<double>(flat.size()) /
+                       static_cast<double>(std::max<std::size_t>(1, values.size() / 3));
   // A plane's border has no normals; so cells are given the benefit of the doubt here, and points are counted in the end.
   const double reasonable = 0.5 * options.min_plane_share * static_cast<double>(grid.finite) / block;
   const double tau = fitter.options().threshold.value_or(0.01);

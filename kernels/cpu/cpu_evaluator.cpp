@@ -59,7 +59,10 @@ Result<> guarded(std::size_t points, Work&& work) {
 class CpuEvaluator final : public FitnessEvaluator {
  public:
   CpuEvaluator(const CpuKernels& kernels, int threads, bool pruning)
-      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning), passes_(kernels) {}
+      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning), passes_(kernels) {
+    // Here and not in the first fit: what TBB looks up about the machine takes milliseconds, once.
+    if (threads > 1) arena_.initialize();
+  }
 
   const Identity& identity() const noexcept override { return identity_; }
   Support supports(const Workload& workload) const override {
