@@ -45,15 +45,19 @@ WorkingPoints::WorkingPoints(const PointsView& points, kernels::Survey survey) :
 std::vector<std::uint32_t> WorkingPoints::finite_at(std::span<const std::size_t> places) const {
   std::vector<std::uint32_t> found;
   found.reserve(places.size());
-  std::size_t word = 0, before = 0;  // finite points in the words before
+  if (places.empty()) return found;
+  // Places rise: each word is counted once and each of its bits passed once.
+  std::size_t word = 0, before = 0, passed = 0;  // finite points in the words before, and passed in this one
+  std::uint64_t bits = survey_.finite[0];
+  auto here = static_cast<std::size_t>(std::popcount(bits));
   for (const std::size_t place : places) {
-    std::size_t here = 0;
-    while (before + (here = static_cast<std::size_t>(std::popcount(survey_.finite[word]))) <= place) {
+    while (before + here <= place) {
       before += here;
-      ++word;
+      bits = survey_.finite[++word];
+      here = static_cast<std::size_t>(std::popcount(bits));
+      passed = 0;
     }
-    std::uint64_t bits = survey_.finite[word];
-    for (std::size_t skip = place - before; skip > 0; --skip) bits &= bits - 1;
+    for (; passed < place - before; ++passed) bits &= bits - 1;
     found.push_back(static_cast<std::uint32_t>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
   }
   return found;

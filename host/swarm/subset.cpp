@@ -42,9 +42,11 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
   const std::size_t n = points.finite_count();
   std::vector<std::size_t> places(std::min(n, size));
   std::iota(places.begin(), places.end(), std::size_t{0});
+  std::array<std::uint32_t, 4> words{};
   for (std::size_t k = 0; k < places.size() && places.size() < n; ++k) {
+    if (k % 4 == 0) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / 4));
     const std::size_t from = n * k / places.size(), to = n * (k + 1) / places.size();
-    places[k] = from + Random::below(random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k))[0], to - from);
+    places[k] = from + Random::below(words[k % 4], to - from);
   }
   return points.finite_at(places);
 }

@@ -61,7 +61,7 @@ class CpuEvaluator final : public FitnessEvaluator {
   CpuEvaluator(const CpuKernels& kernels, int threads, bool pruning)
       : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning), passes_(kernels) {
     // Here and not in the first fit: what TBB looks up about the machine takes milliseconds, once.
-    if (threads > 1) arena_.initialize();
+    arena_.initialize();
   }
 
   const Identity& identity() const noexcept override { return identity_; }

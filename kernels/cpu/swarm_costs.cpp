@@ -13,7 +13,7 @@ namespace {
 /// Runs of tiles; few, so that partial sums stay small whatever the size of the cloud.
 constexpr std::size_t kMaxRuns = 128;
 /// Points x models below which looking at the blocks first cannot pay for the extra passes.
-constexpr std::size_t kLeastWork = std::size_t{1} << 20;
+constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 /// Share of the residuals computed above which pruning pauses, for twice as long each time up to the longest pause.
 constexpr double kPoorShare = 0.8;
 constexpr int kLongestPause = 32;
