@@ -254,6 +254,21 @@ TEST(Payment, AModelOfTheBackgroundsDensityDoesNotPay) {
   EXPECT_LT(log_false_alarms(support(150, 100, 1000), 2), log_false_alarms(support(120, 100, 1000), 2));
 }
 
+TEST(Payment, TwoSurfacesSideBySidePayUnlessOneIsTheOthersLayer) {
+  Settings settings;
+  settings.min_inliers = 10;
+  Support twin = support(120, 220, 1000);  // the other one fills the band
+  EXPECT_FALSE(pays(twin, settings, 2)) << "no denser in its middle than towards its edge";
+  twin.inner = 95;
+  EXPECT_TRUE(pays(twin, settings, 2)) << "a peak of its own";
+  twin.beside = 100;
+  EXPECT_FALSE(pays(twin, settings, 2)) << "beside what has been found";
+  const std::vector<float> distances{0.01F, 0.04F, 0.06F, 0.2F}, caps(4, 0.1F), found{0.5F, 0.8F, 0.1F, 0.1F};
+  const Support s = count_support(distances, caps, 0.1F, found);
+  EXPECT_EQ(s.inner, 2U);
+  EXPECT_EQ(s.beside, 2U) << "of the first slab, those less than seven tau from a found model";
+}
+
 TEST(NoiseScale, GaussianPartAmongUniformBackground) {
   const Random random(5);
   std::vector<float> distances;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/swarm/deflation.hpp"
 #include "host/swarm/labelling.hpp"
@@ -140,7 +141,7 @@ Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<
   theta = swarm.best();
   if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
   if (auto done = refine(theta, loss); !done) return tl::unexpected(done.error());
-  support_ = count_support(distances_, caps_, tau_);
+  support_ = count_support(distances_, caps_, tau_, nearest_);
   if (pays(support_, settings_, space_.minimal_sample())) return Outcome::found;
   const auto& list = swarm.global_bests();
   const bool stable = list.front().fitness - list.back().fitness < kStable * scale_;
@@ -182,6 +183,8 @@ Expected<bool> MultiModel::accept(const models::Position& theta, double loss, co
 }
 
 Expected<> MultiModel::deflate() {
+  nearest_.resize(distances_.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t i = 0; i < nearest_.size(); ++i) nearest_[i] = distances_[i] < nearest_[i] ? distances_[i] : nearest_[i];
   swarm::deflate(distances_, tau_, tail_reach(support_), settings_.dead_zone_slope, caps_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   return show_caps();

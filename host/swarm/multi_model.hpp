@@ -82,6 +82,7 @@ class MultiModel {
   float tau_;
   Ground ground_, part_ground_;                      // all points, and the part
   std::vector<float> caps_, part_caps_, distances_;  // one a point; caps are what is left to explain, in both kinds of deflation
+  std::vector<float> nearest_;                       // one a point: how far the nearest found model is; empty until there is one
   Support support_;                                  // of the last candidate
   std::vector<models::Position> found_;
   std::vector<models::Position> proposals_;  // what the joint end may add to them

@@ -6,37 +6,53 @@
 
 namespace swarmfit::swarm {
 
-Support count_support(std::span<const float> distances, std::span<const float> caps, float tau) {
+Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found) {
   // The last place is for all that is farther, or NaN; one more for what is explained already.
   constexpr auto kFarther = static_cast<float>(Support::kSlabs);
   std::array<std::size_t, Support::kSlabs + 2> counts{};
   const float half = 0.5F * tau, per_tau = 1 / tau;
+  const float reach = kFarther * tau;
   double square = 0;
+  std::size_t inner = 0, beside = 0;
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float d = distances[i];
     const bool unexplained = caps[i] >= half && !std::isnan(d);
     const float slab = d < kFarther * tau ? d * per_tau : kFarther;
     const std::size_t place = unexplained ? static_cast<std::size_t>(std::min(slab, kFarther)) : Support::kSlabs + 1;
     ++counts[place];
-    square += place == 0 ? static_cast<double>(d) * static_cast<double>(d) : 0.0;
+    if (place != 0) continue;
+    square += static_cast<double>(d) * static_cast<double>(d);
+    inner += d < half ? 1 : 0;
+    beside += !found.empty() && found[i] < reach ? 1 : 0;
   }
   Support s;
   s.square = square;
+  s.inner = inner;
+  s.beside = beside;
   s.unexplained = distances.size() - counts[Support::kSlabs + 1];
   std::copy_n(counts.begin(), Support::kSlabs, s.slabs.begin());
   return s;
 }
 
-double log_false_alarms(const Support& support, int minimal_sample) {
-  if (support.inliers() == 0) return 1e300;
-  const auto n = static_cast<double>(support.unexplained);
-  const double k = static_cast<double>(support.inliers()) / n;
-  // The band is twice as wide as the model; one point is added so that an empty band does not make everything certain.
-  const double p = std::min(0.5, (0.5 * static_cast<double>(support.band()) + 1.0) / n);
+namespace {
+
+/// `share` of n points lie where chance puts a share of `chance`.
+double log_false_alarms(double n, double share, double chance, int minimal_sample) {
+  // One point is added so that an empty background does not make everything certain.
+  const double k = share / n, p = std::min(0.5, (chance + 1.0) / n);
   const double tests = minimal_sample * std::log(std::max(n, 2.0));
   if (k <= p) return tests;
   const double divergence = k * std::log(k / p) + (k < 1 ? (1 - k) * std::log((1 - k) / (1 - p)) : 0.0);
   return tests - n * divergence;
+}
+
+}  // namespace
+
+double log_false_alarms(const Support& support, int minimal_sample) {
+  if (support.inliers() == 0) return 1e300;
+  // The band is twice as wide as the model.
+  return log_false_alarms(static_cast<double>(support.unexplained), static_cast<double>(support.inliers()),
+                          0.5 * static_cast<double>(support.band()), minimal_sample);
 }
 
 bool pays(const Support& support, const Settings& settings, int minimal_sample) {
@@ -47,7 +63,10 @@ bool pays(const Support& support, const Settings& settings, int minimal_sample) 
   const auto scaled = [&](std::size_t n) { return static_cast<std::size_t>(static_cast<double>(n) * settings.stands_for); };
   whole.unexplained = scaled(support.unexplained);
   std::transform(support.slabs.begin(), support.slabs.end(), whole.slabs.begin(), scaled);
-  return log_false_alarms(whole, minimal_sample) < kLogFalseAlarms;
+  if (log_false_alarms(whole, minimal_sample) < kLogFalseAlarms) return true;
+  if (2 * support.beside > support.inliers()) return false;
+  const auto inner = static_cast<double>(scaled(support.inner)), ring = static_cast<double>(whole.inliers()) - inner;
+  return log_false_alarms(static_cast<double>(whole.unexplained), inner, ring, minimal_sample) < kLogFalseAlarms;
 }
 
 }  // namespace swarmfit::swarm

@@ -15,19 +15,24 @@ struct Support {
   std::size_t unexplained = 0;              ///< all unexplained points
   std::array<std::size_t, kSlabs> slabs{};  ///< those less than tau away, those from there to 2 tau, and so on
   double square = 0;                        ///< sum of the squared distances of the first slab [data unit^2]
+  std::size_t inner = 0;                    ///< of the first slab, those less than tau / 2 away
+  std::size_t beside = 0;                   ///< of the first slab, those less than kSlabs tau from what has been found
 
   std::size_t inliers() const noexcept { return slabs[0]; }
   /// What surrounds the model.
   std::size_t band() const noexcept { return slabs[1] + slabs[2]; }
 };
 
-/// A point is unexplained while its cap is at least half of tau. NaN distances count for nothing.
-Support count_support(std::span<const float> distances, std::span<const float> caps, float tau);
+/// A point is unexplained while its cap is at least half of tau. NaN distances count for nothing. `found` is empty or one a point: how far
+/// the nearest found model is.
+Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found = {});
 
 /// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
 /// binomial tail, background density from the band, one test for each minimal sample of the points). Lower is more meaningful.
 double log_false_alarms(const Support& support, int minimal_sample);
 
+/// Two surfaces side by side are each other's surroundings, and neither would pay. So the ring from tau / 2 to tau may be the background as well,
+/// where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise.
 bool pays(const Support& support, const Settings& settings, int minimal_sample);
 
 }  // namespace swarmfit::swarm

@@ -96,8 +96,10 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.particles = options.particles.value_or(s.particles);
   s.iterations = options.iterations.value_or(s.iterations);
   // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
-  constexpr int kStallOnPart = 5;
+  // Such short swarms miss more, so one more of them may.
+  constexpr int kStallOnPart = 5, kPatienceOnPart = 3;
   s.stall = options.stall.value_or(s.searches_part(finite_points) ? kStallOnPart : s.stall);
+  if (s.searches_part(finite_points)) s.patience = kPatienceOnPart;
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
