@@ -125,6 +125,15 @@ TEST(Architecture, TheHostSpeaksToTheSeam) {
   });
 }
 
+TEST(Architecture, FittingKnowsNothingOfPerception) {
+  expect_includes({"host/common/", "host/models/", "host/swarm/"}, {}, [](std::string_view include) {
+    return !starts_with_any(include, {"host/perception/", "host/cli/", "host/io/"});
+  });
+  expect_includes({"host/common/"}, {}, [](std::string_view include) {
+    return !starts_with_any(include, {"host/models/", "host/swarm/"});
+  });
+}
+
 TEST(Architecture, InstalledHeadersNeedOnlyEigenAndExpected) {
   const auto allowed = [](std::string_view include) {
     return is_standard(include) || starts_with_any(include, {"swarmfit/", "Eigen/"}) || include == "tl/expected.hpp";

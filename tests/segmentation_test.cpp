@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <swarmfit/scene.hpp>
 
+#include "host/common/graph_cut.hpp"
 #include "host/perception/colour_cost.hpp"
-#include "host/perception/graph_cut.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -102,8 +102,8 @@ TEST(ColourCost, AnEmptySampleCostsAllAndALargeOneIsThinned) {
 }
 
 struct Grid {
-  PottsEnergy energy;
-  std::vector<std::vector<PottsEnergy::Cost>> costs;  // by node and label
+  common::PottsEnergy energy;
+  std::vector<std::vector<common::PottsEnergy::Cost>> costs;  // by node and label
   std::vector<std::array<int, 3>> edges;
   int ground = -1;
 };
@@ -112,13 +112,13 @@ struct Grid {
 Grid random_grid(Random& random, int width, int height, int labels, int ground = -1) {
   Grid grid;
   grid.ground = ground;
-  if (ground >= 0) grid.energy.set_ground(static_cast<PottsEnergy::Label>(ground));
+  if (ground >= 0) grid.energy.set_ground(static_cast<common::PottsEnergy::Label>(ground));
   for (int i = 0; i < width * height; ++i) {
     grid.energy.add_node();
     grid.costs.emplace_back();
     for (int l = 0; l < labels; ++l) {
       grid.costs.back().push_back(random.below(20));
-      grid.energy.add_label(static_cast<PottsEnergy::Label>(l), grid.costs.back().back());
+      grid.energy.add_label(static_cast<common::PottsEnergy::Label>(l), grid.costs.back().back());
     }
     const auto join = [&](int j) {
       const int weight = ground >= 0 ? 2 * random.below(8) : random.below(15);
@@ -132,8 +132,8 @@ Grid random_grid(Random& random, int width, int height, int labels, int ground =
   return grid;
 }
 
-PottsEnergy::Cost plain_energy(const Grid& grid, const std::vector<PottsEnergy::Label>& labels) {
-  PottsEnergy::Cost sum = 0;
+common::PottsEnergy::Cost plain_energy(const Grid& grid, const std::vector<common::PottsEnergy::Label>& labels) {
+  common::PottsEnergy::Cost sum = 0;
   for (std::size_t i = 0; i < labels.size(); ++i) sum += grid.costs[i][labels[i]];
   for (const auto& [i, j, weight] : grid.edges) {
     const int a = labels[static_cast<std::size_t>(i)], b = labels[static_cast<std::size_t>(j)];
@@ -146,10 +146,10 @@ TEST(GraphCut, OneExpansionIsTheBestOfAllSubsets) {
   Random random(3);
   for (int trial = 0; trial < 400; ++trial) {
     Grid grid = random_grid(random, 3, 3, 3, trial % 2 == 0 ? -1 : trial % 3);
-    std::vector<PottsEnergy::Label> start(9);
-    for (auto& label : start) label = static_cast<PottsEnergy::Label>(random.below(3));
-    for (PottsEnergy::Label alpha = 0; alpha < 3; ++alpha) {
-      PottsEnergy::Cost best = std::numeric_limits<PottsEnergy::Cost>::max();
+    std::vector<common::PottsEnergy::Label> start(9);
+    for (auto& label : start) label = static_cast<common::PottsEnergy::Label>(random.below(3));
+    for (common::PottsEnergy::Label alpha = 0; alpha < 3; ++alpha) {
+      common::PottsEnergy::Cost best = std::numeric_limits<common::PottsEnergy::Cost>::max();
       for (int subset = 0; subset < 512; ++subset) {
         auto labels = start;
         for (std::size_t i = 0; i < 9; ++i)
@@ -170,14 +170,14 @@ TEST(GraphCut, MinimisingEndsWithinTwiceTheOptimum) {
   int exact = 0;
   for (int trial = 0; trial < 60; ++trial) {
     Grid grid = random_grid(random, 4, 2, 3);
-    PottsEnergy::Cost best = std::numeric_limits<PottsEnergy::Cost>::max();
+    common::PottsEnergy::Cost best = std::numeric_limits<common::PottsEnergy::Cost>::max();
     for (int code = 0; code < 6561; ++code) {
-      std::vector<PottsEnergy::Label> labels;
-      for (int i = 0, rest = code; i < 8; ++i, rest /= 3) labels.push_back(static_cast<PottsEnergy::Label>(rest % 3));
+      std::vector<common::PottsEnergy::Label> labels;
+      for (int i = 0, rest = code; i < 8; ++i, rest /= 3) labels.push_back(static_cast<common::PottsEnergy::Label>(rest % 3));
       best = std::min(best, plain_energy(grid, labels));
     }
     auto labels = grid.energy.cheapest();
-    const PottsEnergy::Label order[] = {0, 1, 2};
+    const common::PottsEnergy::Label order[] = {0, 1, 2};
     const auto start = plain_energy(grid, labels);
     const auto found = start - grid.energy.minimise(order, 10, labels);
     EXPECT_EQ(found, plain_energy(grid, labels));
@@ -193,7 +193,7 @@ TEST(GraphCut, TheEnergyNeverRises) {
   auto labels = grid.energy.cheapest();
   auto energy = plain_energy(grid, labels);
   for (int step = 0; step < 25; ++step) {
-    const auto fall = grid.energy.expand(static_cast<PottsEnergy::Label>(step % 5), labels);
+    const auto fall = grid.energy.expand(static_cast<common::PottsEnergy::Label>(step % 5), labels);
     EXPECT_GE(fall, 0);
     EXPECT_EQ(plain_energy(grid, labels), energy - fall);
     energy -= fall;
@@ -202,15 +202,15 @@ TEST(GraphCut, TheEnergyNeverRises) {
 
 TEST(GraphCut, PiecesAreMinimisedAloneByAnyNumberOfThreads) {
   Random random(6);
-  PottsEnergy together;
-  std::vector<PottsEnergy> alone(12);
+  common::PottsEnergy together;
+  std::vector<common::PottsEnergy> alone(12);
   for (auto& energy : alone) {
     const int first = static_cast<int>(together.nodes());
     for (int i = 0; i < 30; ++i) {
-      for (PottsEnergy* e : {&energy, &together}) e->add_node();
-      for (PottsEnergy::Label l = 0; l < 4; ++l) {
+      for (common::PottsEnergy* e : {&energy, &together}) e->add_node();
+      for (common::PottsEnergy::Label l = 0; l < 4; ++l) {
         const int cost = random.below(20);
-        for (PottsEnergy* e : {&energy, &together}) e->add_label(l, cost);
+        for (common::PottsEnergy* e : {&energy, &together}) e->add_label(l, cost);
       }
       if (i == 0) continue;
       for (const int j : {i - 1, std::max(0, i - 7)}) {
@@ -221,8 +221,8 @@ TEST(GraphCut, PiecesAreMinimisedAloneByAnyNumberOfThreads) {
     }
   }
   together.close();
-  const PottsEnergy::Label order[] = {0, 1, 2, 3};
-  std::vector<PottsEnergy::Label> expected;
+  const common::PottsEnergy::Label order[] = {0, 1, 2, 3};
+  std::vector<common::PottsEnergy::Label> expected;
   for (auto& energy : alone) {
     energy.close();
     auto labels = energy.cheapest();
@@ -240,7 +240,7 @@ TEST(GraphCut, PiecesAreMinimisedAloneByAnyNumberOfThreads) {
 }
 
 TEST(GraphCut, KeepsToTheLabelsANodeMayTake) {
-  PottsEnergy energy;
+  common::PottsEnergy energy;
   energy.add_node();
   energy.add_label(1, 5);
   energy.add_node();
@@ -249,10 +249,10 @@ TEST(GraphCut, KeepsToTheLabelsANodeMayTake) {
   energy.add_edge(0, 1, 100);
   energy.close();
   auto labels = energy.cheapest();
-  const PottsEnergy::Label order[] = {1, 2, 7, 9};
+  const common::PottsEnergy::Label order[] = {1, 2, 7, 9};
   EXPECT_EQ(energy.energy(labels), 105);
   EXPECT_EQ(energy.minimise(order, 5, labels), 0);
-  EXPECT_EQ(labels, (std::vector<PottsEnergy::Label>{1, 2}));
+  EXPECT_EQ(labels, (std::vector<common::PottsEnergy::Label>{1, 2}));
 }
 
 /// A scene whose pop-out comes from the truth: seen points of objects, but those within a millimetre or eight of the support.

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <limits>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -48,7 +48,7 @@ void copy_points(const std::vector<Scalar>& values, int threads, PointGrid& grid
     break;
   }
   std::atomic<std::size_t> finite = 0;
-  in_parallel(static_cast<int>(count), kPointsAtOnce, threads, [&](int first, int last) {
+  common::in_parallel(static_cast<int>(count), kPointsAtOnce, threads, [&](int first, int last) {
     std::size_t here = 0;
     for (auto i = static_cast<std::size_t>(first); i < static_cast<std::size_t>(last); ++i) {
       const Scalar* x = &values[3 * i];

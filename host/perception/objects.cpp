@@ -6,7 +6,7 @@
 #include <map>
 #include <numeric>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -197,7 +197,7 @@ ObjectLabels separate(const PointGrid& grid, const Popout& popout, const Groupin
       labels.support[static_cast<std::size_t>(objects.of_patch[k])] = popout.support[patches.list[k].group - 1u];
   const auto cells = objects_of_cells(coarse, patches, objects);
   labels.of_point.assign(grid.size(), 0);
-  in_parallel(grid.height, kRowsAtOnce, options.threads, [&](int first, int last) {
+  common::in_parallel(grid.height, kRowsAtOnce, options.threads, [&](int first, int last) {
     for (int v = first; v < last; ++v)
       for (int u = 0; u < grid.width; ++u) {
         const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
@@ -255,7 +255,7 @@ std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const 
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return members[a].size() > members[b].size(); });
 
   std::vector<SpaceOfInterest> spaces(order.size());
-  in_parallel(static_cast<int>(order.size()), 1, threads, [&](int first, int last) {
+  common::in_parallel(static_cast<int>(order.size()), 1, threads, [&](int first, int last) {
     for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k) {
       SpaceOfInterest& soi = spaces[k];
       bounding_sphere(grid, members[order[k]], soi);

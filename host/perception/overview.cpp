@@ -5,7 +5,7 @@
 
 #include <Eigen/Geometry>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -97,14 +97,14 @@ Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads) {
   cells.pitch = grid.pitch * static_cast<float>(overview.stride);
   const auto count = static_cast<std::size_t>(cells.width) * static_cast<std::size_t>(cells.height);
   cells.points.assign(count, Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
-  in_parallel(cells.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, first, last, overview); });
+  common::in_parallel(cells.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, first, last, overview); });
   cells.finite = static_cast<std::size_t>(std::count_if(cells.points.begin(), cells.points.end(), PointGrid::seen));
   if (frame.passive_stereo && frame.coloured()) {
     overview.textured = find_texture(frame, overview);
     return overview;
   }
   overview.normals.assign(count, Eigen::Vector3f::Zero());
-  in_parallel(cells.height, kRowsAtOnce, threads, [&](int first, int last) {
+  common::in_parallel(cells.height, kRowsAtOnce, threads, [&](int first, int last) {
     for (int v = std::max(first, kBaseline); v < std::min(last, cells.height - kBaseline); ++v)
       for (int u = kBaseline; u + kBaseline < cells.width; ++u)
         overview.normals[static_cast<std::size_t>(v * cells.width + u)] = normal_at(cells, u, v);

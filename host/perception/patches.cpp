@@ -5,7 +5,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -164,8 +164,8 @@ CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout, int thr
   coarse.normals.assign(cells, Eigen::Vector3f::Zero());
   coarse.variation.assign(cells, 1);
   coarse.group.assign(cells, 0);
-  in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, popout, first, last, coarse); });
-  in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) {
+  common::in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, popout, first, last, coarse); });
+  common::in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) {
     for (int v = first; v < last; ++v)
       for (int u = 0; u < coarse.width; ++u)
         if (coarse.group[static_cast<std::size_t>(v * coarse.width + u)] != 0) estimate_normal(coarse, u, v, grid.pitch);

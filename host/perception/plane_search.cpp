@@ -6,7 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -214,7 +214,7 @@ void settle(const PointGrid& grid, const std::vector<Surface>& surfaces, int thr
   const int count = static_cast<int>(grid.size());
   fit.labels.assign(grid.size(), 0);
   std::vector<std::vector<Settled>> parts(static_cast<std::size_t>((count + kPointsAtOnce - 1) / kPointsAtOnce));
-  in_parallel(count, kPointsAtOnce, threads, [&](int first, int last) {
+  common::in_parallel(count, kPointsAtOnce, threads, [&](int first, int last) {
     parts[static_cast<std::size_t>(first / kPointsAtOnce)] =
         settle_range(grid, surfaces, tau, static_cast<std::size_t>(first), static_cast<std::size_t>(last), fit.labels);
   });

@@ -4,7 +4,7 @@
 #include <limits>
 #include <unordered_map>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -226,7 +226,7 @@ Popout pop_out(const PointGrid& grid, std::span<const Surface> surfaces, const P
   result.above.assign(grid.size(), -1);
   result.height.assign(grid.size(), 0);
   result.sure.assign(grid.size(), 0);
-  in_parallel(static_cast<int>(grid.size()), kPointsAtOnce, options.threads, [&](int first, int last) {
+  common::in_parallel(static_cast<int>(grid.size()), kPointsAtOnce, options.threads, [&](int first, int last) {
     find_floor_below(grid, surfaces, options, static_cast<std::size_t>(first), static_cast<std::size_t>(last), result);
   });
   if (grid.organised())

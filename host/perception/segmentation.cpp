@@ -4,7 +4,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 #include "host/perception/segmentation_grid.hpp"
 
 namespace swarmfit::perception {
@@ -43,7 +43,7 @@ std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGr
     }
   std::vector<SoiRegion> regions(input.sois.size());
   const cv::Rect image(0, 0, grid.width(), grid.height());
-  in_parallel(static_cast<int>(boxes.size()), 1, threads, [&](int first, int last) {
+  common::in_parallel(static_cast<int>(boxes.size()), 1, threads, [&](int first, int last) {
     for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k) {
       const Box& box = boxes[k];
       if (box.right < 0) continue;

@@ -10,14 +10,14 @@
 #include <Eigen/Eigenvalues>
 #include <opencv2/imgproc.hpp>
 
-#include "host/perception/graph_cut.hpp"
-#include "host/perception/parallel.hpp"
+#include "host/common/graph_cut.hpp"
+#include "host/common/parallel.hpp"
 #include "host/perception/segmentation_grid.hpp"
 
 namespace swarmfit::perception {
 namespace {
 
-using Label = PottsEnergy::Label;
+using Label = common::PottsEnergy::Label;
 constexpr Label kBackground = 0;
 constexpr double kDearest = 8;             // above any cost below
 constexpr int kFixed = -1, kOutside = -2;  // instead of a node's number
@@ -91,7 +91,7 @@ class FusedCut {
   };
 
   void for_regions(const std::function<void(std::size_t)>& body) const {
-    in_parallel(static_cast<int>(regions_.size()), 1, options_.fit.threads, [&](int first, int last) {
+    common::in_parallel(static_cast<int>(regions_.size()), 1, options_.fit.threads, [&](int first, int last) {
       for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k)
         if (regions_[k].label != 0) body(k);
     });
@@ -232,10 +232,10 @@ class FusedCut {
     std::vector<Hls> colours(active_.size());
     pairs_.resize(static_cast<std::size_t>((count + kNodesAtOnce - 1) / kNodesAtOnce));
     const auto colour = [&](std::size_t i) { return to_hls(grid_.rgb(i)[0], grid_.rgb(i)[1], grid_.rgb(i)[2]); };
-    in_parallel(count, kNodesAtOnce, options_.fit.threads, [&](int first, int last) {
+    common::in_parallel(count, kNodesAtOnce, options_.fit.threads, [&](int first, int last) {
       for (int n = first; n < last; ++n) colours[static_cast<std::size_t>(n)] = colour(active_[static_cast<std::size_t>(n)]);
     });
-    in_parallel(count, kNodesAtOnce, options_.fit.threads, [&](int first, int last) {
+    common::in_parallel(count, kNodesAtOnce, options_.fit.threads, [&](int first, int last) {
       PairRange& range = pairs_[static_cast<std::size_t>(first / kNodesAtOnce)];
       range.pairs.reserve(static_cast<std::size_t>(3 * (last - first)));
       for (int n = first; n < last; ++n)
@@ -293,14 +293,14 @@ class FusedCut {
     // A settled neighbour speaks for its label in the node's own costs.
     votes_.clear();
     for (const Pair& pair : pairs) {
-      const PottsEnergy::Cost cost = boundary_cost(pair, beta);
+      const common::PottsEnergy::Cost cost = boundary_cost(pair, beta);
       if (node_[pair.q] >= 0)
         energy_.add_edge(n, node_[pair.q], cost);
       else
         votes_.emplace_back(labels_[pair.q], cost);
     }
     const auto vote = [&](Label label) {
-      PottsEnergy::Cost against = 0;
+      common::PottsEnergy::Cost against = 0;
       for (const auto& [wanted, cost] : votes_)
         if (wanted != label) against += cost;
       return against;
@@ -314,7 +314,7 @@ class FusedCut {
     if (!grid_.finite(active_[static_cast<std::size_t>(n)])) energy_.add_label(kUncertain, to_cost(tuning_.uncertain) + vote(kUncertain));
   }
 
-  PottsEnergy::Cost boundary_cost(const Pair& pair, double beta) const {
+  common::PottsEnergy::Cost boundary_cost(const Pair& pair, double beta) const {
     const double steps = beta * static_cast<double>(pair.difference) * kContrastSteps;
     const double contrast = steps < 16 * kContrastSteps ? contrast_table()[static_cast<std::size_t>(steps)] : 0;
     const double share = tuning_.flat + (1 - tuning_.flat) * contrast;
@@ -364,8 +364,8 @@ class FusedCut {
   std::vector<Candidate> candidates_;         // node by node
   std::vector<std::size_t> first_candidate_;  // of each node
   std::vector<PairRange> pairs_;
-  std::vector<std::pair<Label, PottsEnergy::Cost>> votes_;
-  PottsEnergy energy_;
+  std::vector<std::pair<Label, common::PottsEnergy::Cost>> votes_;
+  common::PottsEnergy energy_;
 };
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "host/perception/graph_cut.hpp"
-#include "host/perception/parallel.hpp"
+#include "host/common/graph_cut.hpp"
+#include "host/common/parallel.hpp"
 #include "host/perception/segmentation_grid.hpp"
 
 namespace swarmfit::perception {
@@ -19,9 +19,9 @@ constexpr std::size_t kLargestSample = 512;
 constexpr int kColourBits = 5;
 constexpr int kCycles = 5;
 
-enum : PottsEnergy::Label { background, object, uncertain, open };
+enum : common::PottsEnergy::Label { background, object, uncertain, open };
 constexpr int kLabels = 3;
-constexpr std::array<PottsEnergy::Label, kLabels> kOrder = {object, background, uncertain};
+constexpr std::array<common::PottsEnergy::Label, kLabels> kOrder = {object, background, uncertain};
 
 /// The cut within one rectangle. Where one label is cheaper than the others by more than all boundaries around a pixel weigh, it is settled
 /// beforehand: no labelling of least energy has another there.
@@ -36,7 +36,7 @@ class PaperCut {
   }
 
   /// Labels of the rectangle's pixels, row after row.
-  std::vector<PottsEnergy::Label> run() {
+  std::vector<common::PottsEnergy::Label> run() {
     node_.assign(labels_.size(), -1);
     int nodes = 0;
     for (std::size_t i = 0; i < labels_.size(); ++i)
@@ -53,13 +53,13 @@ class PaperCut {
   }
 
  private:
-  using Costs = std::array<PottsEnergy::Cost, kLabels>;
+  using Costs = std::array<common::PottsEnergy::Cost, kLabels>;
 
   std::size_t at(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
   }
   /// A label that costs more than this above the cheapest is out of the question.
-  PottsEnergy::Cost most_of_boundaries() const { return 4 * (straight_ + slanted_); }
+  common::PottsEnergy::Cost most_of_boundaries() const { return 4 * (straight_ + slanted_); }
 
   void weigh_pixels(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, const PerceiveOptions& options) {
     SoiColours colours = soi_colours(input, grid, region, options.colour_neighbours, kColourBits, kLargestSample);
@@ -77,8 +77,9 @@ class PaperCut {
         cost[uncertain] = uncertain_cost;
         const auto cheapest = std::min_element(cost.begin(), cost.end());
         const auto rivals =
-            std::count_if(cost.begin(), cost.end(), [&](PottsEnergy::Cost c) { return c <= *cheapest + most_of_boundaries(); });
-        labels_[at(x, y)] = rivals == 1 ? static_cast<PottsEnergy::Label>(cheapest - cost.begin()) : PottsEnergy::Label{open};
+            std::count_if(cost.begin(), cost.end(), [&](common::PottsEnergy::Cost c) { return c <= *cheapest + most_of_boundaries(); });
+        labels_[at(x, y)] =
+            rivals == 1 ? static_cast<common::PottsEnergy::Label>(cheapest - cost.begin()) : common::PottsEnergy::Label{open};
       }
   }
 
@@ -87,13 +88,13 @@ class PaperCut {
     const std::size_t here = at(x, y);
     const int node = energy_.add_node();
     Costs cost = costs_[here];
-    const PottsEnergy::Cost most = *std::min_element(cost.begin(), cost.end()) + most_of_boundaries();
+    const common::PottsEnergy::Cost most = *std::min_element(cost.begin(), cost.end()) + most_of_boundaries();
     const Costs own = cost;
     for (int dy = -1; dy <= 1; ++dy)
       for (int dx = -1; dx <= 1; ++dx) {
         if ((dx == 0 && dy == 0) || x + dx < 0 || y + dy < 0 || x + dx >= width_ || y + dy >= height_) continue;
         const std::size_t to = at(x + dx, y + dy);
-        const PottsEnergy::Cost weight = dx != 0 && dy != 0 ? slanted_ : straight_;
+        const common::PottsEnergy::Cost weight = dx != 0 && dy != 0 ? slanted_ : straight_;
         if (node_[to] >= 0) {
           if (to < here) energy_.add_edge(node_[to], node, weight);
           continue;
@@ -101,15 +102,15 @@ class PaperCut {
         for (std::size_t label = 0; label < cost.size(); ++label) cost[label] += label != labels_[to] ? weight : 0;
       }
     for (std::size_t label = 0; label < cost.size(); ++label)
-      if (own[label] <= most) energy_.add_label(static_cast<PottsEnergy::Label>(label), cost[label]);
+      if (own[label] <= most) energy_.add_label(static_cast<common::PottsEnergy::Label>(label), cost[label]);
   }
 
   int width_, height_;
-  PottsEnergy::Cost straight_ = 0, slanted_ = 0;  // of a boundary between pixels side by side, and across a corner
+  common::PottsEnergy::Cost straight_ = 0, slanted_ = 0;  // of a boundary between pixels side by side, and across a corner
   std::vector<Costs> costs_;
-  std::vector<PottsEnergy::Label> labels_;
+  std::vector<common::PottsEnergy::Label> labels_;
   std::vector<int> node_;  // one a pixel, -1 where it is settled
-  PottsEnergy energy_;
+  common::PottsEnergy energy_;
 };
 
 }  // namespace
@@ -120,8 +121,8 @@ std::vector<std::uint16_t> segment_paper(const SegmentationInput& input, const P
   // A pixel that two SOIs claim goes to the one whose points are nearer.
   std::vector<float> nearest(grid.size(), std::numeric_limits<float>::infinity());
   const auto regions = soi_regions(input, grid, options.soi_margin, 2, options.fit.threads);
-  std::vector<std::vector<PottsEnergy::Label>> cuts(regions.size());
-  in_parallel(static_cast<int>(regions.size()), 1, options.fit.threads, [&](int first, int last) {
+  std::vector<std::vector<common::PottsEnergy::Label>> cuts(regions.size());
+  common::in_parallel(static_cast<int>(regions.size()), 1, options.fit.threads, [&](int first, int last) {
     for (auto k = static_cast<std::size_t>(first); k < static_cast<std::size_t>(last); ++k)
       if (regions[k].label != 0) cuts[k] = PaperCut(input, grid, regions[k], options).run();
   });

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "host/perception/graph_cut.hpp"
+#include "host/common/graph_cut.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -61,8 +61,8 @@ Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const mod
 }
 
 void Labelling::label(State& state) const {
-  perception::PottsEnergy potts;
-  using Cost = perception::PottsEnergy::Cost;
+  common::PottsEnergy potts;
+  using Cost = common::PottsEnergy::Cost;
   const std::size_t points = part_.index().size(), models = state.models.size();
   potts.reserve(points, points * (models + 1), edges_.size());
   std::vector<std::uint16_t> nearest(points, 0);

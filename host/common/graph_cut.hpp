@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "host/perception/min_cut.hpp"
+#include "host/common/min_cut.hpp"
 
-namespace swarmfit::perception {
+namespace swarmfit::common {
 
 /// E(l) = sum_i cost_i(l_i) + sum_(i,j) w_ij [l_i != l_j]. Each node has its own list of labels it may take. Costs and weights are whole
 /// numbers, so that energies are exact; a node's dearest label and all weights at it together must stay below 2^28. One label may be ground
@@ -98,4 +98,4 @@ class PottsEnergy {
   std::vector<Role> role_;  // one a node, within an expansion
 };
 
-}  // namespace swarmfit::perception
+}  // namespace swarmfit::common

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace swarmfit::perception {
+namespace swarmfit::common {
 
 /// One graph, of which each cut takes a part. Arcs lie node by node, and each has its mate in the other direction. Parts without a node or
 /// an arc in common may be cut at the same time by different threads.
@@ -55,4 +55,4 @@ class CutGraph {
   std::vector<Node> nodes_;
 };
 
-}  // namespace swarmfit::perception
+}  // namespace swarmfit::common

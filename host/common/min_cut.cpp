@@ -1,10 +1,10 @@
-#include "host/perception/min_cut.hpp"
+#include "host/common/min_cut.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <utility>
 
-namespace swarmfit::perception {
+namespace swarmfit::common {
 
 /// Two trees, of nodes that the source still reaches and of nodes that still reach the sink, grow until they meet; the path is filled up;
 /// nodes cut off by that look for new parents.
@@ -200,4 +200,4 @@ CutGraph::CutGraph(std::vector<std::int32_t> first, std::vector<Arc> arcs)
 
 void CutGraph::cut(std::span<const std::int32_t> part) { CutSearch(*this).run(part); }
 
-}  // namespace swarmfit::perception
+}  // namespace swarmfit::common

@@ -1,13 +1,13 @@
-#include "host/perception/graph_cut.hpp"
+#include "host/common/graph_cut.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <numeric>
 #include <utility>
 
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
-namespace swarmfit::perception {
+namespace swarmfit::common {
 
 void PottsEnergy::reserve(std::size_t nodes, std::size_t labels, std::size_t edges) {
   first_.reserve(nodes);
@@ -240,4 +240,4 @@ PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles
   return fall;
 }
 
-}  // namespace swarmfit::perception
+}  // namespace swarmfit::common

@@ -1,11 +1,11 @@
-#include "host/perception/parallel.hpp"
+#include "host/common/parallel.hpp"
 
 #include <algorithm>
 #include <atomic>
 
 #include <opencv2/core/utility.hpp>
 
-namespace swarmfit::perception {
+namespace swarmfit::common {
 
 void in_parallel(int count, int grain, int threads, const std::function<void(int, int)>& body) {
   if (count <= 0) return;
@@ -21,4 +21,4 @@ void in_parallel(int count, int grain, int threads, const std::function<void(int
     cv::parallel_for_(cv::Range(0, workers), work, workers);
 }
 
-}  // namespace swarmfit::perception
+}  // namespace swarmfit::common
