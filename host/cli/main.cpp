@@ -10,6 +10,7 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/process.hpp"
 
 namespace swarmfit::cli {
 namespace {
@@ -60,6 +61,7 @@ int run(int argc, const char* const* argv) {
 }  // namespace swarmfit::cli
 
 int main(int argc, char** argv) {
+  swarmfit::cli::settle_process();
   try {
     return swarmfit::cli::run(argc, argv);
   } catch (const std::bad_alloc&) {
