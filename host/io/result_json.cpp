@@ -49,12 +49,15 @@ std::string parameters(const Model& model) {
   return "{}";
 }
 
+/// Only of what is followed over frames.
+std::string id(std::uint64_t value) { return value == 0 ? "" : fmt::format(R"(,"id":{})", value); }
+
 std::string json(const Model& m) {
   return fmt::format(
       R"({{"type":{},"parameters":{},"inliers":{},"cost":{},"rms":{},"covariance":{},"supporting":{},"iterations":{},"evaluations":{},)"
-      R"("points_touched":{},"found_at_ms":{}}})",
+      R"("points_touched":{},"found_at_ms":{}{}}})",
       text(name(m.type)), parameters(m), m.inliers, number(m.cost), number(m.rms), rows(m.covariance), m.supporting, m.iterations,
-      m.evaluations, number(m.points_touched), number(m.found_at_ms));
+      m.evaluations, number(m.points_touched), number(m.found_at_ms), id(m.id));
 }
 
 std::string json(const SpaceOfInterest& soi) {
@@ -63,8 +66,8 @@ std::string json(const SpaceOfInterest& soi) {
     if (!names.empty()) names += ",";
     names += fmt::format(R"({{"name":{},"inliers":{},"score":{}}})", text(r.name), r.inliers, number(r.score));
   }
-  return fmt::format(R"({{"centre":{},"radius":{},"points":{},"plane":{},"bbox":[{},{},{},{}],"recognised":[{}]}})", list(soi.centre, 3),
-                     number(soi.radius), soi.points, soi.plane, soi.bbox[0], soi.bbox[1], soi.bbox[2], soi.bbox[3], names);
+  return fmt::format(R"({{"centre":{},"radius":{},"points":{},"plane":{},"bbox":[{},{},{},{}],"recognised":[{}]{}}})", list(soi.centre, 3),
+                     number(soi.radius), soi.points, soi.plane, soi.bbox[0], soi.bbox[1], soi.bbox[2], soi.bbox[3], names, id(soi.id));
 }
 
 /// One item a line.
@@ -75,8 +78,9 @@ std::string array(const Items& items) {
   return out.empty() ? "[]" : "[" + out + "\n  ]";
 }
 
-std::string document(const FitResult& fit, const std::vector<SpaceOfInterest>& sois, const Cloud& input, const std::string& timing) {
-  std::string out = "{\n  \"schema\": 1,\n";
+std::string document(const FitResult& fit, const std::vector<SpaceOfInterest>& sois, const Cloud& input, const std::string& timing,
+                     const std::string& frame = {}) {
+  std::string out = "{\n  \"schema\": 1,\n" + frame;
   out += fmt::format("  \"input\": {{\"points\":{},\"finite\":{},\"width\":{},\"height\":{}}},\n", input.size(), fit.finite_points,
                      input.width, input.height);
   out += fmt::format("  \"backend\": {{\"name\":{},\"device\":{},\"reason\":{}}},\n", text(fit.backend.name), text(fit.backend.device),
@@ -95,11 +99,33 @@ std::string to_json(const FitResult& result, const Cloud& input, double load_ms)
   return document(result, {}, input, timing);
 }
 
-std::string to_json(const PerceiveResult& result, const Cloud& input) {
+namespace {
+
+std::string perception_document(const PerceiveResult& result, const Cloud& input, const std::string& frame) {
   const auto& t = result.timing_ms;
   const auto timing = fmt::format(R"({{"total":{},"load":{},"fit":{},"popout":{},"segment":{},"recognise":{}}})", number(t.total),
                                   number(t.load), number(t.fit), number(t.popout), number(t.segment), number(t.recognise));
-  return document(result.fit, result.sois, input, timing);
+  return document(result.fit, result.sois, input, timing, frame);
+}
+
+}  // namespace
+
+std::string to_json(const PerceiveResult& result, const Cloud& input) { return perception_document(result, input, {}); }
+
+std::string to_json_line(const PerceiveResult& result, const Cloud& input, std::size_t index, const std::string& name) {
+  const auto frame = fmt::format("  \"frame\": {{\"index\":{},\"name\":{}}},\n", index, text(name));
+  const auto document = perception_document(result, input, frame);
+  // Texts hold no line's end: JSON escapes it.
+  std::string line;
+  line.reserve(document.size() + 1);
+  for (std::size_t i = 0; i < document.size(); ++i) {
+    if (document[i] != '\n') {
+      line += document[i];
+      continue;
+    }
+    while (i + 1 < document.size() && document[i + 1] == ' ') ++i;
+  }
+  return line + "\n";
 }
 
 }  // namespace swarmfit

@@ -16,6 +16,7 @@
 #include "host/perception/recognition.hpp"
 #include "host/perception/segmentation.hpp"
 #include "host/perception/surface.hpp"
+#include "host/perception/tracking.hpp"
 #include "host/perception/vertical.hpp"
 
 namespace swarmfit {
@@ -74,11 +75,13 @@ struct Perceiver::State {
   std::optional<perception::Vertical> vertical;
   std::optional<Fitter> fitter;  ///< of any plane until the vertical is known, then of horizontal ones
   std::optional<perception::Gallery> gallery;
+  perception::Tracker tracker;
 
   FitOptions fit_options() const;
   Expected<> suit_sensor(const Cloud& frame);
   Expected<> find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                            PerceiveResult& result);
+  std::vector<Model> last_planes(const PointGrid& grid) const;
   void find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const;
 };
 
@@ -118,6 +121,14 @@ Expected<> Perceiver::State::find_vertical(const PointGrid& grid, const percepti
   planes->finite_points = grid.finite;
   result.fit = std::move(*planes);
   return {};
+}
+
+/// In the grid's frame.
+std::vector<Model> Perceiver::State::last_planes(const PointGrid& grid) const {
+  if (!options.track) return {};
+  auto planes = tracker.planes();
+  for (Model& plane : planes) plane.parameters[3] += plane.normal().dot(grid.origin);
+  return planes;
 }
 
 void Perceiver::State::find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const {
@@ -180,7 +191,8 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   std::vector<Surface> supports;
   if (state_->vertical) {
     result.up = state_->vertical->up;
-    auto search = perception::find_supports(*state_->fitter, grid, overview, result.up, state_->options, on_plane, stop);
+    auto search =
+        perception::find_supports(*state_->fitter, grid, overview, result.up, state_->options, on_plane, stop, state_->last_planes(grid));
     if (!search) return tl::unexpected(search.error());
     result.fit = std::move(search->fit);
     supports = std::move(search->supports);
@@ -200,6 +212,7 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   } else if (frame.organised()) {
     result.objects = result.popout;
   }
+  if (state_->options.track && !stop.stop_requested()) state_->tracker.follow(result);
   result.timing_ms.total = whole.lap();
   return result;
 } catch (const std::bad_alloc&) {

@@ -268,7 +268,8 @@ Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, co
 }
 
 Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const Overview& overview, const Eigen::Vector3d& up,
-                                    const PerceiveOptions& options, const ModelCallback& on_plane, const std::stop_token& stop) {
+                                    const PerceiveOptions& options, const ModelCallback& on_plane, const std::stop_token& stop,
+                                    const std::vector<Model>& warm_start) {
   const auto least_cosine = static_cast<float>(std::cos(std::min(1.4, options.horizontal_angle + kNormalSlack)));
   const auto flat = flat_cells(overview, up.cast<float>(), least_cosine);
   PlaneSearch search;
@@ -296,7 +297,7 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
     told.inliers = static_cast<std::size_t>(block * static_cast<double>(model.inliers));
     return on_plane(told);
   };
-  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), on_model, stop);
+  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), on_model, stop, warm_start);
   if (!fitted) return tl::unexpected(fitted.error());
   search.fit = std::move(*fitted);
   auto& fit = search.fit;

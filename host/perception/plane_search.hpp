@@ -23,8 +23,9 @@ struct PlaneSearch {
   std::vector<Surface> supports;  ///< of the supporting models
 };
 
-/// One horizontal plane after another until none of reasonable size is left.
+/// One horizontal plane after another until none of reasonable size is left. `warm_start`: planes that seed the swarm, in the grid's frame.
 Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const Overview& overview, const Eigen::Vector3d& up,
-                                    const PerceiveOptions& options, const ModelCallback& on_plane, const std::stop_token& stop);
+                                    const PerceiveOptions& options, const ModelCallback& on_plane, const std::stop_token& stop,
+                                    const std::vector<Model>& warm_start = {});
 
 }  // namespace swarmfit::perception

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <limits>
 
+#include "host/common/parallel.hpp"
 #include "host/perception/scene_room.hpp"
 
 namespace swarmfit {
@@ -22,16 +23,13 @@ using perception::Solid;
 constexpr double kHalfTilt = 0.2679491924311227;
 constexpr double kCosTilt = (1 - kHalfTilt * kHalfTilt) / (1 + kHalfTilt * kHalfTilt);
 constexpr double kSinTilt = 2 * kHalfTilt / (1 + kHalfTilt * kHalfTilt);
-const Vector3d kEye(0, 0, 1.5);
 const Vector3d kLamp(-0.9, 0.1, 2.7);
+constexpr int kRowsAtOnce = 8;            // that one thread looks at
 constexpr double kBaseline = 0.075;       // [m] between the depth camera's projector and its eye
 constexpr double kDisparityStep = 0.125;  // [px at 640 columns] what the sensor can tell apart
 
 // Streams of random numbers.
 enum : std::uint64_t { kDepthNoise = 1, kColourNoise, kHoles, kPatches };
-
-/// Camera (x right, y down, z forward) to world.
-Vector3d to_world(const Vector3d& v) { return {v.x(), kCosTilt * v.z() - kSinTilt * v.y(), -kCosTilt * v.y() - kSinTilt * v.z()}; }
 
 struct Pixel {
   double depth = std::numeric_limits<double>::infinity();  ///< true z in the camera's frame [m]
@@ -42,7 +40,15 @@ struct Pixel {
 
 class Camera {
  public:
-  Camera(const Room& room, std::uint64_t seed, int width, int height) : room_(room), seed_(seed), width_(width), height_(height) {
+  Camera(const Room& room, std::uint64_t seed, int width, int height, const SceneCamera& place)
+      : room_(room),
+        seed_(seed),
+        noise_seed_(seed ^ (place.exposure * 0x9E3779B97F4A7C15ULL)),
+        width_(width),
+        height_(height),
+        eye_(place.eye),
+        cos_pan_((1 - place.pan * place.pan) / (1 + place.pan * place.pan)),
+        sin_pan_(2 * place.pan / (1 + place.pan * place.pan)) {
     intrinsics_ = {525.0 * width / 640, 525.0 * width / 640, (width - 1) / 2.0, (height - 1) / 2.0};
   }
 
@@ -68,14 +74,22 @@ class Camera {
   }
   Vector3d bearing(double u, double v) const { return {(u - intrinsics_.cx) / intrinsics_.fx, (v - intrinsics_.cy) / intrinsics_.fy, 1}; }
 
+  /// Camera (x right, y down, z forward) to world.
+  Vector3d to_world(const Vector3d& v) const {
+    const Vector3d w(v.x(), kCosTilt * v.z() - kSinTilt * v.y(), -kCosTilt * v.y() - kSinTilt * v.z());
+    return {cos_pan_ * w.x() - sin_pan_ * w.y(), sin_pan_ * w.x() + cos_pan_ * w.y(), w.z()};
+  }
+
   void trace() {
     pixels_.resize(index(0, height_));
-    for (int v = 0; v < height_; ++v)
-      for (int u = 0; u < width_; ++u) pixels_[index(u, v)] = look(u, v);
+    common::in_parallel(height_, kRowsAtOnce, 0, [this](int first, int last) {
+      for (int v = first; v < last; ++v)
+        for (int u = 0; u < width_; ++u) pixels_[index(u, v)] = look(u, v);
+    });
   }
 
   Pixel look(int u, int v) const {
-    const Ray ray{kEye, to_world(bearing(u, v))};
+    const Ray ray{eye_, to_world(bearing(u, v))};
     Pixel pixel;
     const Solid* nearest = nullptr;
     Hit hit;
@@ -100,7 +114,7 @@ class Camera {
     Colour sum = Colour::Zero();
     for (const double du : {-0.25, 0.25})
       for (const double dv : {-0.25, 0.25}) {
-        const auto h = meet(solid, {kEye, to_world(bearing(u + du, v + dv))});
+        const auto h = meet(solid, {eye_, to_world(bearing(u + du, v + dv))});
         sum += h ? paint(solid.material, h->where, h->extent) : centre;
       }
     return sum / 4;
@@ -125,7 +139,7 @@ class Camera {
   std::vector<std::uint16_t> write_truth(SceneTruth& truth) const {
     for (const double z : room_.support_heights) {
       // World z is -cos tilt * y - sin tilt * z of the camera, plus the eye's height.
-      truth.planes.emplace_back(0, -kCosTilt, -kSinTilt, kEye.z() - z);
+      truth.planes.emplace_back(0, -kCosTilt, -kSinTilt, eye_.z() - z);
     }
     std::vector<std::size_t> seen(room_.object_names.size() + 1);
     for (const Pixel& p : pixels_) ++seen[p.object];
@@ -134,6 +148,7 @@ class Camera {
       if (seen[k] * 1500 < pixels_.size()) continue;
       truth.object_names.push_back(room_.object_names[k - 1]);
       truth.object_planes.push_back(room_.object_supports[k - 1]);
+      truth.object_ids.push_back(static_cast<std::uint16_t>(k));
       number[k] = static_cast<std::uint16_t>(truth.object_names.size());
     }
     truth.objects = truth.object_names.size();
@@ -158,7 +173,7 @@ class Camera {
           for (int i = 0; i < 3; ++i)
             sum += weight[i] * weight[j] *
                    pixels_[index(std::clamp(u + reach[i], 0, width_ - 1), std::clamp(v + reach[j], 0, height_ - 1))].colour;
-        const auto bits = perception::random_bits(seed_, kColourNoise, index(u, v));
+        const auto bits = perception::random_bits(noise_seed_, kColourNoise, index(u, v));
         for (int c = 0; c < 3; ++c) {
           const std::uint32_t word = bits[static_cast<std::size_t>(c)];
           const double noise = ((word & 0xFFFF) + (word >> 16)) * 0x1p-16 - 1;  // triangular
@@ -171,7 +186,7 @@ class Camera {
   /// Near to normal, of variance 1: eight uniforms, each 16 bits of one draw.
   double gauss(std::size_t i) const {
     double sum = -4;
-    for (const std::uint32_t word : perception::random_bits(seed_, kDepthNoise, i)) sum += ((word & 0xFFFF) + (word >> 16)) * 0x1p-16;
+    for (const std::uint32_t word : perception::random_bits(noise_seed_, kDepthNoise, i)) sum += ((word & 0xFFFF) + (word >> 16)) * 0x1p-16;
     return sum * 1.224744871391589;  // sqrt(12 / 8)
   }
 
@@ -207,7 +222,7 @@ class Camera {
       jump = std::max(jump, std::abs(depth_at(u + dx, v + dy) - here));
     const double slant = pixels_[index(u, v)].slant;
     const double chance = jump > 0.03 ? 0.6 : (slant < 0.12 ? 0.5 : 0.002);
-    return perception::uniform(seed_, kHoles, index(u, v)) < chance;
+    return perception::uniform(noise_seed_, kHoles, index(u, v)) < chance;
   }
 
   /// Gloss: a few blobs of the image return nothing.
@@ -245,17 +260,35 @@ class Camera {
   }
 
   const Room& room_;
-  std::uint64_t seed_;
+  std::uint64_t seed_, noise_seed_;
   int width_, height_;
+  Vector3d eye_;
+  double cos_pan_, sin_pan_;
   Intrinsics intrinsics_;
   std::vector<Pixel> pixels_;
 };
 
 }  // namespace
 
-Scene make_room_scene(std::uint64_t seed, int width, int height) {
+Scene make_room_scene(std::uint64_t seed, int width, int height) { return make_room_scene(seed, width, height, SceneCamera{}); }
+
+Scene make_room_scene(std::uint64_t seed, int width, int height, const SceneCamera& camera) {
   const Room room = perception::furnish_room(seed);
-  return Camera(room, seed, std::max(width, 1), std::max(height, 1)).shoot();
+  return Camera(room, seed, std::max(width, 1), std::max(height, 1), camera).shoot();
+}
+
+SceneCamera walk_in_room(std::size_t k, std::size_t frames) {
+  // A sine's shape from parabolas, of period 1.
+  const auto wave = [](double t) {
+    t -= std::floor(t);
+    return t < 0.5 ? 16 * t * (0.5 - t) : -16 * (t - 0.5) * (1 - t);
+  };
+  const double t = static_cast<double>(k) / static_cast<double>(std::max<std::size_t>(frames, 1));
+  SceneCamera camera;
+  camera.eye = {0.22 * wave(t), 0.08 * wave(2 * t), 1.5 + 0.04 * wave(3 * t)};
+  camera.pan = 0.05 * wave(t);
+  camera.exposure = k;
+  return camera;
 }
 
 }  // namespace swarmfit

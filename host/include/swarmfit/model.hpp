@@ -45,6 +45,7 @@ struct Model {
   std::size_t evaluations = 0;  ///< particles scored for it
   double points_touched = 1;    ///< share of points x particles really computed, in [0, 1]
   double found_at_ms = 0;       ///< since the start of the fit
+  std::uint64_t id = 0;         ///< set by perception where frames follow each other: 1, 2 ..., the same plane over frames
 
   /// plane: the unit normal; line2d: the unit normal with z = 0. Of these two only.
   Eigen::Vector3d normal() const {

@@ -35,6 +35,7 @@ struct PerceiveOptions {
   double uncertain_cost = 0;         ///< fixed cost of the third label, in (0, 1); 0: the default of the preset
   double smoothness = 0;             ///< weight of the boundary term, > 0; 0: the default of the preset
   std::filesystem::path gallery;     ///< folder: one image, or a folder of images, a name; empty: no recognition
+  bool track = false;                ///< frames follow each other: the last one's planes seed the search, planes and SOIs keep their ids
 
   SWARMFIT_API Expected<> validate() const;
 };
@@ -53,6 +54,7 @@ struct SpaceOfInterest {
   int plane = 0;                        ///< 1-based index into models
   std::array<int, 4> bbox{};            ///< x, y, width, height [px]; zeros without an image grid
   std::vector<Recognition> recognised;  ///< best first
+  std::uint64_t id = 0;                 ///< with PerceiveOptions::track: 1, 2 ..., the same thing over frames, never given twice; else 0
 };
 
 /// Label in `objects` for pixels where neither object nor background is likely.
@@ -70,7 +72,7 @@ struct PerceiveResult {
   } timing_ms;  ///< total leaves out loading and writing files
 };
 
-/// Holds the back end, the gallery and the vertical of the first view; reuse it over frames.
+/// Holds the back end, the gallery and the vertical of the first view, and with PerceiveOptions::track what was seen; reuse it over frames.
 class SWARMFIT_API Perceiver {
  public:
   static Expected<Perceiver> create(const PerceiveOptions& options);

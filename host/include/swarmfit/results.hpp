@@ -17,6 +17,8 @@ namespace swarmfit {
 /// result.json, schema 1. `load_ms`: time spent reading the input.
 SWARMFIT_API std::string to_json(const FitResult& result, const Cloud& input, double load_ms);
 SWARMFIT_API std::string to_json(const PerceiveResult& result, const Cloud& input);
+/// The same on one line, for one frame of a sequence; `frame` holds its index and name. Ends with a line's end.
+SWARMFIT_API std::string to_json_line(const PerceiveResult& result, const Cloud& input, std::size_t index, const std::string& name);
 
 /// Could `file` be written, could `folder` be made and written to? To ask before the work is done; leaves nothing behind.
 SWARMFIT_API Expected<> check_writable(const std::filesystem::path& file);
