@@ -1,6 +1,8 @@
 // swarmfit demo
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -10,7 +12,9 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/identity_check.hpp"
 #include "host/cli/perceive.hpp"
+#include "host/cli/sequence.hpp"
 #include "host/cli/truth_table.hpp"
 
 namespace swarmfit::cli {
@@ -28,7 +32,7 @@ constexpr const char* kMotorcycleCalib =
 
 struct DemoArguments {
   bool motorcycle = false;
-  std::string pair = kPairFolder;
+  std::string pair = kPairFolder, frames;
   FitFlags fit;
   SceneFlags scene;
   OutputFlags output;
@@ -61,7 +65,38 @@ int run_motorcycle(PerceiveJob job, const std::string& folder) {
   return run_perceive(job);
 }
 
+/// A walk through the room; what is the same thing is known.
+int run_walk(const DemoArguments& arguments, std::size_t frames) {
+  SequenceJob job;
+  if (auto ok = arguments.fit.apply(job.options.fit); !ok) return complain(ok.error());
+  if (auto ok = arguments.scene.apply(job.options); !ok) return complain(ok.error());
+  if (!arguments.output.labels.empty()) return complain({Error::Kind::invalid_option, "--labels: is of one frame, not with --frames"});
+  job.output = arguments.output;
+  auto truth = std::make_shared<SceneTruth>();
+  auto check = std::make_shared<IdentityCheck>();
+  job.next = [=, next = std::size_t{0}](const std::stop_token& stop) mutable -> std::optional<FrameRef> {
+    if (next >= frames || stop.stop_requested()) return std::nullopt;
+    const std::size_t k = next++;
+    return FrameRef{k, fmt::format("{:04}", k), "the built-in scene", [=]() -> Expected<Cloud> {
+                      Scene scene = make_room_scene(1, 640, 480, walk_in_room(k, frames));
+                      *truth = std::move(scene.truth);
+                      return std::move(scene.cloud);
+                    }};
+  };
+  job.ahead = false;  // the drawing would take time from the work that is timed
+  job.watch = [=](const FrameRef&, const PerceiveResult& result, const Cloud&) { check->add(*truth, result); };
+  job.more = [check] { return check->report(); };
+  return run_sequence(job);
+}
+
 int run(const DemoArguments& arguments) {
+  if (!arguments.frames.empty()) {
+    const auto frames = parse_number(arguments.frames);
+    if (!frames || *frames < 1 || *frames > 1e6 || *frames != std::floor(*frames))
+      return complain({Error::Kind::invalid_option, fmt::format("--frames: {}, must be a whole number in 1..1000000", arguments.frames)});
+    if (arguments.motorcycle) return complain({Error::Kind::invalid_option, "--frames and --motorcycle exclude each other"});
+    return run_walk(arguments, static_cast<std::size_t>(*frames));
+  }
   PerceiveJob job;
   if (auto ok = arguments.fit.apply(job.options.fit); !ok) return complain(ok.error());
   if (auto ok = arguments.scene.apply(job.options); !ok) return complain(ok.error());
@@ -78,10 +113,13 @@ Command add_demo(CLI::App& app) {
   auto* motorcycle =
       sub->add_option("--motorcycle", a->pair, fmt::format("Instead: the real stereo pair Motorcycle, from this folder [{}]", kPairFolder));
   motorcycle->type_name("DIR")->expected(0, 1);
+  sub->add_option("--frames", a->frames,
+                  "Instead: a walk through the scene, so many frames long, as a sequence: one line of JSON a frame, files only with --out")
+      ->type_name("N");
   a->scene.add_to(*sub);
   a->fit.add_to(*sub);
   a->output.add_to(*sub, "A folder for the results; look at overlay.png [swarmfit-demo]");
-  sub->footer("examples:\n  swarmfit demo\n  swarmfit demo --motorcycle --out motorcycle");
+  sub->footer("examples:\n  swarmfit demo\n  swarmfit demo --motorcycle --out motorcycle\n  swarmfit demo --frames 300 > walk.jsonl");
   return {sub, [a, motorcycle] {
             a->motorcycle = motorcycle->count() > 0;
             if (a->pair.empty()) a->pair = kPairFolder;
