@@ -15,7 +15,7 @@ TEST(CliUsage, HelpAndVersion) {
   EXPECT_EQ(help.code, 0);
   for (const char* word : {"fit", "perceive", "bench", "devices", "demo", "Exit codes", "metres"})
     EXPECT_NE(help.out.find(word), std::string::npos) << word;
-  for (const char* sub : {"fit", "perceive", "bench", "devices", "demo"}) {
+  for (const char* sub : {"fit", "perceive", "learn", "bench", "devices", "demo"}) {
     const auto sub_help = run_swarmfit(folder, {sub, "--help"});
     EXPECT_EQ(sub_help.code, 0) << sub;
     EXPECT_EQ(sub_help.err, "") << sub;

@@ -15,6 +15,7 @@ struct Command {
 
 Command add_fit(CLI::App& app);
 Command add_perceive(CLI::App& app);
+Command add_learn(CLI::App& app);
 Command add_bench(CLI::App& app);
 Command add_devices(CLI::App& app);
 Command add_demo(CLI::App& app);

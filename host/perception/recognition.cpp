@@ -1,17 +1,13 @@
 #include "host/perception/recognition.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
-#include <fstream>
-#include <iterator>
 #include <string>
 
-#include <fmt/format.h>
 #include <Eigen/Geometry>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "host/perception/gallery_index.hpp"
+#include "host/perception/gallery_pictures.hpp"
 #include "host/perception/recognition_match.hpp"
 
 namespace swarmfit::perception {
@@ -19,69 +15,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Matches that must agree on one placement. Fewer came together by chance on wood grain and print that is in no gallery.
-constexpr std::size_t kLeastInliers = 6;
-constexpr int kLargestView = 640;  // [px] larger pictures are scaled down: nothing is seen so large
-constexpr int kSmall = 128;        // [px] a proto-object smaller than this is looked at through a lens of two
-constexpr int kLeastArea = 400;    // [px] smaller proto-objects have too little print to be told by
-constexpr int kBorder = 12;        // [px] around a proto-object: SIFT's support beyond its outline
+constexpr int kLeastArea = 400;  // [px] smaller proto-objects have too little print to be told by
 
 struct View {
   std::string name;
   Features features;
 };
-
-bool is_image(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  static constexpr std::array<std::string_view, 9> known = {".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp"};
-  return std::find(known.begin(), known.end(), extension) != known.end();
-}
-
-/// What a folder holds, by name, so that the order does not depend on the file system.
-Expected<std::vector<fs::path>> entries(const fs::path& folder) {
-  std::error_code error;
-  fs::directory_iterator it(folder, error);
-  if (error)
-    return fail(Error::Kind::bad_input, fmt::format("gallery {}: cannot be read as a folder: {}", folder.string(), error.message()));
-  std::vector<fs::path> found;
-  for (; it != fs::directory_iterator(); it.increment(error)) {
-    if (error) return fail(Error::Kind::bad_input, fmt::format("gallery {}: {}", folder.string(), error.message()));
-    if (it->path().filename().string().front() != '.') found.push_back(it->path());
-  }
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
-/// Where an image has transparency, only what is opaque belongs to the object.
-Expected<View> read_view(const std::string& name, const fs::path& file) {
-  // Decoded from memory: imread reports to stderr what it cannot open.
-  std::ifstream stream(file, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
-  cv::Mat image;
-  try {
-    if (!bytes.empty()) image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) return fail(Error::Kind::bad_input, fmt::format("gallery image {}: cannot be read", file.string()));
-  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257);
-  if (image.depth() != CV_8U)
-    return fail(Error::Kind::bad_input, fmt::format("gallery image {}: neither 8 nor 16 bits a channel", file.string()));
-  const int longest = std::max(image.rows, image.cols);
-  if (longest > kLargestView) cv::resize(image, image, {}, 1.0 * kLargestView / longest, 1.0 * kLargestView / longest, cv::INTER_AREA);
-  cv::Mat1b grey, mask;
-  if (image.channels() == 4) {
-    cv::extractChannel(image, mask, 3);
-    mask = mask > 127;
-    cv::cvtColor(image, grey, cv::COLOR_BGRA2GRAY);
-  } else if (image.channels() == 3) {
-    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  } else {
-    cv::extractChannel(image, grey, 0);
-  }
-  return View{name, find_features(grey, mask)};
-}
 
 /// One place of one view in the frame.
 struct Candidate {
@@ -132,28 +71,13 @@ Gallery& Gallery::operator=(Gallery&&) noexcept = default;
 
 Expected<Gallery> Gallery::load(const fs::path& folder) {
   auto state = std::make_unique<State>();
-  const auto top = entries(folder);
-  if (!top) return tl::unexpected(top.error());
-  std::vector<std::pair<std::string, fs::path>> images;
-  for (const fs::path& entry : *top) {
-    std::error_code ignored;
-    if (fs::is_directory(entry, ignored)) {
-      const auto inside = entries(entry);
-      if (!inside) return tl::unexpected(inside.error());
-      const std::size_t before = images.size();
-      for (const fs::path& file : *inside)
-        if (is_image(file)) images.emplace_back(entry.filename().string(), file);
-      if (images.size() == before) return fail(Error::Kind::bad_input, fmt::format("gallery {}: holds no image", entry.string()));
-    } else if (is_image(entry)) {
-      images.emplace_back(entry.stem().string(), entry);
-    }
-  }
-  if (images.empty())
-    return fail(Error::Kind::bad_input, fmt::format("gallery {}: holds no image and no folder of images", folder.string()));
-  for (const auto& [name, file] : images) {
-    auto view = read_view(name, file);
-    if (!view) return tl::unexpected(view.error());
-    state->views.push_back(std::move(*view));
+  const auto pictures = list_pictures(folder);
+  if (!pictures) return tl::unexpected(pictures.error());
+  auto index = GalleryIndex::read(folder);
+  for (const auto& [name, file] : *pictures) {
+    auto features = features_of(file, index);
+    if (!features) return tl::unexpected(features.error());
+    state->views.push_back({name, std::move(*features)});
   }
   return Gallery(std::move(state));
 }
@@ -173,10 +97,7 @@ std::vector<std::vector<Recognition>> Gallery::recognise(const Cloud& frame, std
     if (box.empty() || cv::countNonZero(mask) < kLeastArea) continue;
     box = (box - cv::Point(kBorder, kBorder) + cv::Size(2 * kBorder, 2 * kBorder)) & cv::Rect({}, grey.size());
     cv::Mat1b patch = grey(box), inside = mask(box);
-    if (std::max(box.width, box.height) < kSmall + 2 * kBorder) {
-      cv::resize(grey(box), patch, {}, 2, 2, cv::INTER_CUBIC);
-      cv::resize(mask(box), inside, {}, 2, 2, cv::INTER_NEAREST);
-    }
+    look_closer(patch, inside);
     names[k - 1] = name_object(state_->views, find_features(patch, inside));
   }
   return names;

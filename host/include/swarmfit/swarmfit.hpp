@@ -6,6 +6,7 @@
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/error.hpp>
 #include <swarmfit/fit.hpp>
+#include <swarmfit/gallery.hpp>
 #include <swarmfit/images.hpp>
 #include <swarmfit/model.hpp>
 #include <swarmfit/perception.hpp>
