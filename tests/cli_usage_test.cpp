@@ -13,9 +13,9 @@ TEST(CliUsage, HelpAndVersion) {
   const TemporaryFolder folder;
   const auto help = run_swarmfit(folder, {"--help"});
   EXPECT_EQ(help.code, 0);
-  for (const char* word : {"fit", "perceive", "bench", "devices", "demo", "Exit codes", "metres"})
+  for (const char* word : {"fit", "perceive", "bench", "devices", "demo", "figures", "Exit codes", "metres"})
     EXPECT_NE(help.out.find(word), std::string::npos) << word;
-  for (const char* sub : {"fit", "perceive", "learn", "bench", "devices", "demo"}) {
+  for (const char* sub : {"fit", "perceive", "learn", "bench", "devices", "demo", "figures"}) {
     const auto sub_help = run_swarmfit(folder, {sub, "--help"});
     EXPECT_EQ(sub_help.code, 0) << sub;
     EXPECT_EQ(sub_help.err, "") << sub;

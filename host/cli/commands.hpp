@@ -19,5 +19,6 @@ Command add_learn(CLI::App& app);
 Command add_bench(CLI::App& app);
 Command add_devices(CLI::App& app);
 Command add_demo(CLI::App& app);
+Command add_figures(CLI::App& app);
 
 }  // namespace swarmfit::cli

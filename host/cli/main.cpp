@@ -30,8 +30,10 @@ std::string usage_error(const CLI::App& app, const CLI::ParseError& error, int a
   const auto subcommands = app.get_subcommands();
   if (subcommands.empty()) {
     const std::string first = argc > 1 ? argv[1] : "";
-    if (first.empty()) return "no subcommand; must be one of fit, perceive, learn, bench, devices, demo (swarmfit --help tells more)";
-    return fmt::format("{}: not known; must be one of fit, perceive, learn, bench, devices, demo (swarmfit --help tells more)", first);
+    if (first.empty())
+      return "no subcommand; must be one of fit, perceive, learn, bench, devices, demo, figures (swarmfit --help tells more)";
+    return fmt::format("{}: not known; must be one of fit, perceive, learn, bench, devices, demo, figures (swarmfit --help tells more)",
+                       first);
   }
   return fmt::format("{} (swarmfit {} --help tells more)", error.what(), subcommands.front()->get_name());
 }
@@ -43,7 +45,8 @@ int run(int argc, const char* const* argv) {
   app.require_subcommand(1);
   app.footer(kFooter);
   app.get_formatter()->column_width(32);
-  const std::vector<Command> commands = {add_fit(app), add_perceive(app), add_learn(app), add_bench(app), add_devices(app), add_demo(app)};
+  const std::vector<Command> commands = {add_fit(app),     add_perceive(app), add_learn(app),  add_bench(app),
+                                         add_devices(app), add_demo(app),     add_figures(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {

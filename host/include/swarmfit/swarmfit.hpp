@@ -5,6 +5,7 @@
 #include <swarmfit/bench.hpp>
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/error.hpp>
+#include <swarmfit/figures.hpp>
 #include <swarmfit/fit.hpp>
 #include <swarmfit/gallery.hpp>
 #include <swarmfit/images.hpp>
