@@ -22,16 +22,16 @@ Chart::Chart(Svg& svg, const Place& corner, double width, double height, Axis x,
   for (const double tick : x_.ticks) {
     const double px = at(tick, y_.range.low).x();
     svg_.line({px, corner.y()}, {px, bottom}, kGrid);
-    svg_.text({px, bottom + 14}, fmt::format("{:g}", tick), {.size = 11, .anchor = "middle"});
+    svg_.text({px, bottom + 14}, fmt::format("{:.6g}", std::abs(tick) < 1e-12 ? 0.0 : tick), {.size = 11, .anchor = "middle"});
   }
   for (const double tick : y_.ticks) {
     const double py = at(x_.range.low, tick).y();
     svg_.line({corner.x(), py}, {corner.x() + width, py}, kGrid);
-    svg_.text({corner.x() - 6, py + 4}, fmt::format("{:g}", tick), {.size = 11, .anchor = "end"});
+    svg_.text({corner.x() - 6, py + 4}, fmt::format("{:.6g}", std::abs(tick) < 1e-12 ? 0.0 : tick), {.size = 11, .anchor = "end"});
   }
   svg_.rectangle(corner, width, height, "none", kFrame.colour);
   if (!x_.label.empty()) svg_.text({middle, bottom + 32}, x_.label, {.anchor = "middle"});
-  if (!y_.label.empty()) svg_.text({corner.x() - 40, corner.y() + height / 2}, y_.label, {.anchor = "middle", .upright = true});
+  if (!y_.label.empty()) svg_.text({corner.x() - 56, corner.y() + height / 2}, y_.label, {.anchor = "middle", .upright = true});
   svg_.text({middle, corner.y() - 8}, title, {.size = 13, .anchor = "middle", .colour = "#111827", .bold = true});
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <set>
 #include <utility>
@@ -47,6 +46,19 @@ Polar polar(const Segment& s) {
 Axis angle_axis() { return {"direction of the line's normal [degrees]", {0, 180}, {0, 45, 90, 135, 180}}; }
 Axis offset_axis() { return {"offset from the middle [side of the square]", {-0.75, 0.75}, {-0.5, 0, 0.5}}; }
 Axis side_axis() { return {"", {0, 1}, {0, 0.5, 1}}; }
+
+/// From the least to the largest of these and a little beyond, with some four ticks.
+Axis close_axis(std::string label, const std::vector<double>& values) {
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  const double span = std::max(*high - *low, 1e-6), unit = std::pow(10, std::floor(std::log10(span / 3)));
+  double step = unit;
+  for (const double times : {2.0, 5.0, 10.0}) {
+    if (span / step > 5) step = times * unit;
+  }
+  Axis axis{std::move(label), {*low - 0.15 * span, *high + 0.15 * span}, {}};
+  for (double k = std::ceil(axis.range.low / step); k * step <= axis.range.high; ++k) axis.ticks.push_back(k * step);
+  return axis;
+}
 
 void caption(Svg& svg, double y, std::initializer_list<std::string> lines) {
   for (const std::string& words : lines) {
@@ -128,14 +140,14 @@ Figure global_best_figure(const Flight& flight, const LineScene& scene) {
   Svg svg(960, 520);
   const Axis time{"iteration", {0, static_cast<double>(kMoves)}, {0, 50, 100, 150}};
   const Polar truth = polar(scene.truth.front());
-  Axis angle = angle_axis(), offset = offset_axis();
-  angle.label = "normal [degrees]";
-  offset.label = "offset [side]";
-  Axis fitness{"fitness f", {0, 0}, {}};
-  fitness.range = {std::floor(flight.steps.back().best_fitness * 10 - 0.5) / 10,
-                   std::ceil(flight.steps.front().best_fitness * 10 + 0.5) / 10};
-  const double step = fitness.range.high - fitness.range.low > 1 ? 0.5 : 0.2;
-  for (double v = std::ceil(fitness.range.low / step) * step; v <= fitness.range.high; v += step) fitness.ticks.push_back(v);
+  std::vector<double> degrees = {truth.degrees}, sides = {truth.offset}, fitness_values;
+  for (const Step& s : flight.steps) {
+    degrees.push_back(polar(s.best).degrees);
+    sides.push_back(polar(s.best).offset);
+    fitness_values.push_back(s.best_fitness);
+  }
+  const Axis angle = close_axis("normal [degrees]", degrees), offset = close_axis("offset [side]", sides);
+  const Axis fitness = close_axis("fitness f", fitness_values);
   Axis quiet = time;
   quiet.label.clear();
   Chart angles(svg, {70, 40}, 390, 170, quiet, angle, "Direction of the global best");
