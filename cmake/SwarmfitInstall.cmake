@@ -7,6 +7,16 @@ install(TARGETS swarmfit EXPORT swarmfitTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 if(SWARMFIT_BUILD_CLI)
   install(TARGETS swarmfit_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  if(TARGET swarmfit_terminal_files)
+    set(terminal ${PROJECT_BINARY_DIR}/terminal)
+    # OPTIONAL: a build of some targets alone may have written none of them.
+    install(FILES ${terminal}/swarmfit.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 OPTIONAL)
+    install(FILES ${terminal}/swarmfit.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME swarmfit OPTIONAL)
+    # Zsh looks in the first; Debian's, for what packages bring, in the second.
+    install(FILES ${terminal}/_swarmfit DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions OPTIONAL)
+    install(FILES ${terminal}/_swarmfit DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions OPTIONAL)
+    install(FILES ${terminal}/swarmfit.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d OPTIONAL)
+  endif()
 endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/host/include/swarmfit DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -95,8 +95,8 @@ TEST(CliDemo, ShowsTheTruthBesideWhatWasFound) {
   const TemporaryFolder folder;
   const Outcome outcome = run_swarmfit(folder, {"demo"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find("true surface"), std::string::npos);
-  EXPECT_NE(outcome.out.find("true object"), std::string::npos);
+  EXPECT_NE(outcome.out.find("surface  normal"), std::string::npos);
+  EXPECT_NE(outcome.out.find("object  kind"), std::string::npos);
   for (const char* name : {"result.json", "planes.png", "popout.png", "objects.png", "overlay.png"}) {
     EXPECT_TRUE(fs::is_regular_file(folder / "swarmfit-demo" / name)) << name;
   }

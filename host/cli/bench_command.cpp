@@ -1,4 +1,5 @@
 // swarmfit bench
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -6,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include <swarmfit/backend.hpp>
 #include <swarmfit/bench.hpp>
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/results.hpp>
@@ -99,16 +101,34 @@ Expected<BenchPlan> plan(const BenchArguments& arguments) {
 }
 
 std::string report_table(const BenchReport& report) {
-  std::vector<std::vector<std::string>> rows = {
-      {"back end", "device", "model", "points", "particles", "pruning", "Geval/s", "of FMA limit", "ms a swarm", "max rel. error"}};
-  for (const BenchRow& row : report.rows) {
-    rows.push_back({row.backend, row.device, row.model, std::to_string(row.points), std::to_string(row.particles),
-                    row.pruning ? "on" : "off", fmt::format("{:.2f}", row.evaluations_per_s * 1e-9),
-                    fmt::format("{:.0f} %", 100 * row.fraction_of_limit), fmt::format("{:.3f}", row.seconds * 1e3),
-                    fmt::format("{:.1e}", row.max_relative_error)});
+  std::string out;
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t k = 0; k < report.rows.size(); ++k) {
+    const BenchRow& row = report.rows[k];
+    if (rows.empty()) rows = {{"model", "points", "particles", "pruning", "Geval/s", "of FMA limit", "ms a swarm", "max rel. error"}};
+    rows.push_back({row.model, std::to_string(row.points), std::to_string(row.particles), row.pruning ? "on" : "off",
+                    fmt::format("{:.2f}", row.evaluations_per_s * 1e-9), fmt::format("{:.0f} %", 100 * row.fraction_of_limit),
+                    fmt::format("{:.3f}", row.seconds * 1e3), fmt::format("{:.1e}", row.max_relative_error)});
+    const bool last = k + 1 == report.rows.size();
+    if (last || report.rows[k + 1].backend != row.backend || report.rows[k + 1].device != row.device) {
+      out += fmt::format("{}: {}\n{}", row.backend, row.device, table(rows));
+      rows.clear();
+    }
   }
-  return table(rows) + fmt::format("the CPU reached {:.1f} G fused multiply-adds a second in this run, {} thread{}\n",
-                                   report.fma_per_s * 1e-9, report.threads, report.threads == 1 ? "" : "s");
+  return out + fmt::format("the CPU reached {:.1f} G fused multiply-adds a second in this run, {} thread{}\n", report.fma_per_s * 1e-9,
+                           report.threads, report.threads == 1 ? "" : "s");
+}
+
+/// How many rows a bench has; `from_file`: its points are one size.
+std::size_t rows_of(const BenchOptions& options, bool from_file) {
+  std::size_t backends = options.backends.size();
+  if (backends == 0) {
+    const auto all = devices();
+    backends = static_cast<std::size_t>(
+        std::count_if(all.begin(), all.end(), [](const Device& device) { return device.usable && device.backend != "reference"; }));
+  }
+  const std::size_t models = options.models.empty() ? model_types().size() : options.models.size();
+  return backends * models * (from_file ? 1 : options.points.size()) * options.particles.size() * options.pruning.size();
 }
 
 int run(const BenchArguments& arguments) {
@@ -128,7 +148,12 @@ int run(const BenchArguments& arguments) {
   Expected<BenchReport> report;
   {
     Progress progress(arguments.quiet);
-    report = bench(checked->options, cloud ? &view : nullptr, [&](const std::string& row) { progress.say(row); });
+    const std::size_t whole = rows_of(checked->options, cloud.has_value());
+    std::size_t started = 0;
+    report = bench(checked->options, cloud ? &view : nullptr, [&](const std::string& row) {
+      progress.step(fmt::format("row {} of {}: {}", started + 1, whole, row), started, whole);
+      ++started;
+    });
   }
   if (!report) return complain(report.error());
   if (!arguments.json.empty()) {

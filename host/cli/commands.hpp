@@ -20,5 +20,8 @@ Command add_bench(CLI::App& app);
 Command add_devices(CLI::App& app);
 Command add_demo(CLI::App& app);
 Command add_figures(CLI::App& app);
+Command add_doctor(CLI::App& app);
+Command add_completion(CLI::App& app);
+Command add_man(CLI::App& app);
 
 }  // namespace swarmfit::cli

@@ -1,6 +1,8 @@
 #include "host/cli/console.hpp"
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <condition_variable>
 #include <csignal>
 #include <cstdio>
@@ -22,6 +24,15 @@ std::string on_one_line(std::string_view message) {
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
   }
   return line;
+}
+
+const std::string kPlain = "\033[0m";
+const std::string kRed = "\033[1;31m", kGreen = "\033[32m", kYellow = "\033[33m";
+
+/// A note that a person should not overlook.
+void alarm(std::string_view message) {
+  const bool colours = wants_colours(STDERR_FILENO);
+  fmt::print(stderr, "{}swarmfit:{} {}\n", colours ? kRed.c_str() : "", colours ? kPlain.c_str() : "", on_one_line(message));
 }
 
 /// A stop source may not be touched in a signal handler, a pipe may: a thread waits at its other end.
@@ -53,13 +64,35 @@ int exit_code(Error::Kind kind) noexcept {
 void note(std::string_view message) { fmt::print(stderr, "swarmfit: {}\n", on_one_line(message)); }
 
 int complain(const Error& error) {
-  note(error.message);
+  alarm(error.message);
   return exit_code(error.kind);
 }
 
 int wrong_usage(std::string_view message) {
-  note(message);
+  alarm(message);
   return kWrongUsage;
+}
+
+bool wants_colours(int descriptor) {
+  const char* refused = std::getenv("NO_COLOR");
+  if (refused && *refused) return false;
+  const char* terminal = std::getenv("TERM");
+  return ::isatty(descriptor) == 1 && terminal && *terminal && std::string_view(terminal) != "dumb";
+}
+
+std::string painted_marks(const std::string& table) {
+  if (!wants_colours(STDOUT_FILENO)) return table;
+  std::string out;
+  for (std::size_t start = 0; start < table.size();) {
+    const std::size_t end = std::min(table.find('\n', start), table.size() - 1) + 1;
+    std::string line = table.substr(start, end - start);
+    for (const auto& [mark, colour] : {std::pair{"  ok", kGreen}, std::pair{"  --", kYellow}, std::pair{"  NO", kRed}}) {
+      if (line.starts_with(mark)) line = colour + line.substr(0, 4) + kPlain + line.substr(4);
+    }
+    out += line;
+    start = end;
+  }
+  return out;
 }
 
 Progress::Progress(bool quiet) {
@@ -71,6 +104,38 @@ Progress::~Progress() = default;
 void Progress::say(std::string what) {
   const std::scoped_lock lock(mutex_);
   what_ = std::move(what);
+  done_ = whole_ = 0;
+  stage_ = Clock::now();
+}
+
+void Progress::step(std::string what, std::size_t done, std::size_t whole) {
+  const std::scoped_lock lock(mutex_);
+  what_ = std::move(what);
+  done_ = done;
+  whole_ = whole;
+}
+
+void Progress::within(double ms) {
+  const std::scoped_lock lock(mutex_);
+  if (ms > 0) deadline_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::milli>(ms));
+}
+
+std::string Progress::line() const {
+  using Seconds = std::chrono::duration<double>;
+  const auto now = Clock::now();
+  std::string text = fmt::format("{:.0f} s: {}", Seconds(now - start_).count(), what_);
+  std::optional<double> left;
+  if (done_ > 0) {
+    const double each = Seconds(now - stage_).count() / static_cast<double>(done_);
+    text += each < 1 ? fmt::format(", {:.1f} a second", 1 / each) : fmt::format(", {:.1f} s each", each);
+    if (whole_ > done_) left = each * static_cast<double>(whole_ - done_);
+  }
+  if (deadline_) {
+    const double allowed = std::max(0.0, Seconds(*deadline_ - now).count());
+    left = left ? std::min(*left, allowed) : allowed;
+  }
+  if (left) text += fmt::format(", about {:.0f} s left", std::ceil(*left));
+  return text;
 }
 
 void Progress::run(const std::stop_token& stop) {
@@ -80,9 +145,8 @@ void Progress::run(const std::stop_token& stop) {
   std::unique_lock lock(asleep);
   bool shown = false;
   for (auto wait = 1000ms; !wake.wait_for(lock, stop, wait, [&] { return stop.stop_requested(); }); wait = 200ms) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     const std::scoped_lock reading(mutex_);
-    fmt::print(stderr, "\r\033[K{:.0f} s: {}", seconds, what_);
+    fmt::print(stderr, "\r\033[K{}", line());
     std::fflush(stderr);
     shown = true;
   }

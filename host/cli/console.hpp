@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -27,6 +28,11 @@ int wrong_usage(std::string_view message);
 /// "swarmfit: message" on stderr, nothing to worry about.
 void note(std::string_view message);
 
+/// May colours go there (STDOUT_FILENO, STDERR_FILENO)? On a terminal that knows them, and not where NO_COLOR is set.
+bool wants_colours(int descriptor);
+/// The marks of a doctor's table, "ok", "--" and "NO" at a line's start, in colour where stdout wants it.
+std::string painted_marks(const std::string& table);
+
 /// While it lives, and once a second has passed, a line on the terminal says what is being done. Silent where stderr is no terminal.
 class Progress {
  public:
@@ -36,12 +42,21 @@ class Progress {
   Progress& operator=(const Progress&) = delete;
   /// What is being done now: "fitting, 3 planes so far".
   void say(std::string what);
+  /// The same, with so many done of the whole, 0 where nobody knows it: the line shows the rate, and the time left where it can be told.
+  void step(std::string what, std::size_t done, std::size_t whole = 0);
+  /// From now on, no longer than this; 0: no bound.
+  void within(double ms);
 
  private:
+  using Clock = std::chrono::steady_clock;
+  std::string line() const;
   void run(const std::stop_token& stop);
   std::mutex mutex_;
   std::string what_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::size_t done_ = 0, whole_ = 0;
+  const Clock::time_point start_ = Clock::now();
+  Clock::time_point stage_ = start_;  // since when things are counted
+  std::optional<Clock::time_point> deadline_;
   std::jthread ticker_;  // last: it reads the rest
 };
 

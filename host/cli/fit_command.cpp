@@ -107,13 +107,15 @@ int run(const FitArguments& arguments) {
   const Interrupt interrupt;
   FitResult result;
   Cloud input;
-  double load_ms = 0;
+  double load_ms = 0, ready_ms = 0;
   {
     Progress progress(arguments.output.quiet);
     progress.say("making the back end ready");
+    const Stopwatch starting;
     auto fitter = Fitter::create(*options);
     if (!fitter) return complain(fitter.error());
 
+    ready_ms = starting.ms();
     progress.say("reading " + arguments.input);
     const Stopwatch loading;
     auto cloud = read_input(arguments);
@@ -122,16 +124,23 @@ int run(const FitArguments& arguments) {
     load_ms = loading.ms();
 
     progress.say("fitting");
+    progress.within(options->time_budget_ms);
     std::size_t found = 0;
     const auto on_model = [&](const Model&) {
-      progress.say(fmt::format("fitting, {} found so far", ++found));
+      ++found;
+      progress.step(fmt::format("fitting, {} found so far", found), found, options->max_models);
       return Verdict::go_on;
     };
     auto fitted = fitter->fit(input.points(), on_model, interrupt.token());
     if (!fitted) return complain(fitted.error());
     result = std::move(*fitted);
   }
+  const Stopwatch writing;
   if (auto ok = write(arguments, result, input, load_ms); !ok) return complain(ok.error());
+  if (arguments.output.verbose) {
+    for (const std::string& line : explanation(result, input)) note(line);
+    note(stages({{"back end", ready_ms}, {"loading", load_ms}, {"fit", result.total_ms}, {"writing", writing.ms()}}));
+  }
   if (!arguments.output.quiet) fmt::print("{}", summary(result, input, load_ms));
   return kDone;
 }

@@ -4,12 +4,14 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include <swarmfit/version.hpp>
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/help_tree.hpp"
 #include "host/cli/process.hpp"
 
 namespace swarmfit::cli {
@@ -19,21 +21,27 @@ constexpr const char* kFooter = R"(A first run:
   swarmfit demo                              the built-in scene; then look at swarmfit-demo/overlay.png
   swarmfit perceive table.pcd --out result   planes, objects and their outlines in a depth camera's frame
   swarmfit fit plane scan.ply --json r.json  every plane of a cloud
+  swarmfit doctor                            what is installed, and how to get what is missing
   swarmfit SUBCOMMAND --help                 all options, more examples
 
 Units: metres for 3D input, the data's own unit for 2D; angles in degrees, times in milliseconds.
 Exit codes: 0 done, 2 wrong usage, 3 input cannot be used or output not written, 4 back end cannot be used.
 An error is one line on stderr.)";
 
+/// "fit, perceive, ...": the commands there are.
+std::string command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const auto& command : help_tree(app).commands) names.push_back(command.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 /// What CLI11 has to say, in our form.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error, int argc, const char* const* argv) {
   const auto subcommands = app.get_subcommands();
   if (subcommands.empty()) {
     const std::string first = argc > 1 ? argv[1] : "";
-    if (first.empty())
-      return "no subcommand; must be one of fit, perceive, learn, bench, devices, demo, figures (swarmfit --help tells more)";
-    return fmt::format("{}: not known; must be one of fit, perceive, learn, bench, devices, demo, figures (swarmfit --help tells more)",
-                       first);
+    const std::string what = first.empty() ? "no subcommand" : first + ": not known";
+    return fmt::format("{}; must be one of {} (swarmfit --help tells more)", what, command_names(app));
   }
   return fmt::format("{} (swarmfit {} --help tells more)", error.what(), subcommands.front()->get_name());
 }
@@ -45,8 +53,8 @@ int run(int argc, const char* const* argv) {
   app.require_subcommand(1);
   app.footer(kFooter);
   app.get_formatter()->column_width(32);
-  const std::vector<Command> commands = {add_fit(app),     add_perceive(app), add_learn(app),  add_bench(app),
-                                         add_devices(app), add_demo(app),     add_figures(app)};
+  const std::vector<Command> commands = {add_fit(app),  add_perceive(app), add_learn(app),  add_bench(app),      add_devices(app),
+                                         add_demo(app), add_figures(app),  add_doctor(app), add_completion(app), add_man(app)};
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& asked) {

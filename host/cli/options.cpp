@@ -141,6 +141,7 @@ void OutputFlags::add_to(CLI::App& app, const std::string& out_help) {
       ->group(group);
   app.add_option("--out", out, out_help)->type_name("DIR")->group(group);
   app.add_flag("--quiet", quiet, "No summary, no progress")->group(group);
+  app.add_flag("--verbose", verbose, "What was decided on the way, and the time of each stage, on stderr")->group(group);
 }
 
 Expected<> OutputFlags::check() const {

@@ -34,7 +34,7 @@ struct FitFlags {
 /// Where results go.
 struct OutputFlags {
   std::string json, labels, out;
-  bool quiet = false;
+  bool quiet = false, verbose = false;
 
   void add_to(CLI::App& app, const std::string& out_help);
   /// Fails with cannot_write, before any work is done.

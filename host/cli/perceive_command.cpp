@@ -149,7 +149,8 @@ int run_perceive(const PerceiveJob& job) {
     progress.say("perceiving");
     std::size_t found = 0;
     const auto on_plane = [&](const Model&) {
-      progress.say(fmt::format("perceiving, {} planes so far", ++found));
+      ++found;
+      progress.step(fmt::format("perceiving, {} planes so far", found), found);
       return Verdict::go_on;
     };
     auto perceived = perceiver->perceive(input, on_plane, interrupt.token());
@@ -158,6 +159,11 @@ int run_perceive(const PerceiveJob& job) {
     result.timing_ms.load = load_ms;
     progress.say("writing");
     if (auto ok = write(job.output, result, input); !ok) return complain(ok.error());
+  }
+  if (job.output.verbose) {
+    for (const std::string& line : explanation(result.fit, input)) note(line);
+    const auto& t = result.timing_ms;
+    note(stages({{"loading", t.load}, {"fit", t.fit}, {"pop-out", t.popout}, {"segment", t.segment}, {"recognise", t.recognise}}));
   }
   if (!job.output.quiet) {
     fmt::print("{}", summary(result, input));

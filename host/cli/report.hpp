@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <swarmfit/cloud.hpp>
@@ -10,10 +11,14 @@
 
 namespace swarmfit::cli {
 
-/// Rows of cells, printed with columns lined up; numbers to the right.
+/// Rows of cells, printed with columns lined up; numbers to the right. Cells are wrapped so that a line has 80 columns, if words allow it.
 std::string table(const std::vector<std::vector<std::string>>& rows);
 
 std::string summary(const FitResult& result, const Cloud& input, double load_ms);
 std::string summary(const PerceiveResult& result, const Cloud& input);
+
+/// What was decided on the way, a line a decision: for --verbose.
+std::vector<std::string> explanation(const FitResult& result, const Cloud& input);
+std::string stages(const std::vector<std::pair<const char*, double>>& times_ms);
 
 }  // namespace swarmfit::cli

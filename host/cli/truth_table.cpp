@@ -65,7 +65,7 @@ Eigen::Vector3d centre_of(const Cloud& cloud, Labels truth, std::size_t k, const
 }
 
 std::string planes_table(const Scene& scene, const PerceiveResult& result, const std::vector<bool>& seen) {
-  std::vector<std::vector<std::string>> rows = {{"true surface", "normal", "found as", "supports", "angle off", "height off", "overlap"}};
+  std::vector<std::vector<std::string>> rows = {{"surface", "normal", "found as", "supports", "angle", "height", "overlap"}};
   for (std::size_t k = 1; k <= scene.truth.planes.size(); ++k) {
     const Eigen::Vector4d& plane = scene.truth.planes[k - 1];
     const Eigen::Vector3d normal = plane.head<3>();
@@ -86,7 +86,7 @@ std::string planes_table(const Scene& scene, const PerceiveResult& result, const
 }
 
 std::string objects_table(const Scene& scene, const PerceiveResult& result, const std::vector<bool>& seen) {
-  std::vector<std::vector<std::string>> rows = {{"true object", "kind", "pixels", "found as", "outline's overlap", "name"}};
+  std::vector<std::vector<std::string>> rows = {{"object", "kind", "pixels", "found as", "outline's overlap", "name"}};
   std::size_t found = 0;
   for (std::size_t k = 1; k <= scene.truth.objects; ++k) {
     const auto pixels = std::count(scene.truth.object_labels.begin(), scene.truth.object_labels.end(), k);
@@ -110,7 +110,8 @@ std::string objects_table(const Scene& scene, const PerceiveResult& result, cons
 
 std::string truth_table(const Scene& scene, const PerceiveResult& result) {
   const std::vector<bool> seen = seen_pixels(scene.cloud);
-  return "\nthe scene's truth beside what was found\n" + planes_table(scene, result, seen) + objects_table(scene, result, seen);
+  return "\nthe scene's truth, what was found as it, and how far it is off\n" + planes_table(scene, result, seen) +
+         objects_table(scene, result, seen);
 }
 
 }  // namespace swarmfit::cli

@@ -1,0 +1,146 @@
+// What a terminal gets: completion, the man page, the doctor, tables of 80 columns, and no escape codes in a pipe.
+#include <algorithm>
+#include <cstdio>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/cli_runner.hpp"
+
+namespace {
+
+using swarmfit::tests::expect_refusal;
+using swarmfit::tests::run_swarmfit;
+using swarmfit::tests::TemporaryFolder;
+
+const std::vector<std::string> kCommands = {"fit", "perceive", "learn", "bench", "devices", "demo", "doctor", "completion"};
+
+/// stdout and stderr of a line of bash, and how it ended.
+std::pair<int, std::string> in_bash(const TemporaryFolder& folder, const std::string& script) {
+  folder.put("script.sh", script);
+  std::FILE* pipe = ::popen(("cd '" + folder.path().string() + "' && bash script.sh 2>&1").c_str(), "r");
+  std::string out;
+  char buffer[4096];
+  for (std::size_t n; pipe && (n = std::fread(buffer, 1, sizeof buffer, pipe)) > 0;) out.append(buffer, n);
+  return {pipe ? ::pclose(pipe) : -1, out};
+}
+
+/// Every --option that the help of a command names.
+std::vector<std::string> options_of(const TemporaryFolder& folder, const std::string& command) {
+  const std::string help = run_swarmfit(folder, {command, "--help"}).out;
+  static const std::regex line(R"(\n +(?:-[a-z],)?(--[a-z-]+))");
+  std::vector<std::string> options;
+  for (std::sregex_iterator it(help.begin(), help.end(), line), end; it != end; ++it) options.push_back((*it)[1]);
+  return options;
+}
+
+std::string words_offered(const TemporaryFolder& folder, const std::string& line) {
+  const auto [code, out] = in_bash(folder, "source completion.bash\nCOMP_WORDS=(" + line +
+                                               ")\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n_swarmfit\necho \" ${COMPREPLY[*]} \"\n");
+  EXPECT_EQ(code, 0) << out;
+  return out;
+}
+
+TEST(CliTerminal, BashCompletes) {
+  const TemporaryFolder folder;
+  const auto script = run_swarmfit(folder, {"completion", "bash"});
+  ASSERT_EQ(script.code, 0) << script.err;
+  folder.put("completion.bash", script.out);
+  folder.put("room.pcd", "");
+  const std::string commands = words_offered(folder, "swarmfit ''");
+  for (const auto& command : kCommands) {
+    EXPECT_NE(commands.find(" " + command + " "), std::string::npos) << command << " in" << commands;
+    const std::string offered = words_offered(folder, "swarmfit " + command + " --");
+    const auto options = options_of(folder, command);
+    EXPECT_FALSE(options.empty()) << command;
+    for (const auto& option : options)
+      EXPECT_NE(offered.find(" " + option + " "), std::string::npos) << command << " " << option << offered;
+  }
+  EXPECT_EQ(commands.find(" man "), std::string::npos);
+  EXPECT_EQ(words_offered(folder, "swarmfit fit --preset f"), " fast \n");
+  EXPECT_EQ(words_offered(folder, "swarmfit fit --seed 2 pla"), " plane \n");
+  EXPECT_EQ(words_offered(folder, "swarmfit fit plane room"), " room.pcd \n");
+  EXPECT_EQ(words_offered(folder, "swarmfit fit --seed ''"), "  \n");
+  EXPECT_EQ(words_offered(folder, "swarmfit completion z"), " zsh \n");
+}
+
+TEST(CliTerminal, OtherShellsAreGivenEveryOption) {
+  const TemporaryFolder folder;
+  const std::string zsh = run_swarmfit(folder, {"completion", "zsh"}).out, fish = run_swarmfit(folder, {"completion", "fish"}).out;
+  EXPECT_TRUE(zsh.starts_with("#compdef swarmfit\n"));
+  for (const auto& command : kCommands) {
+    EXPECT_NE(zsh.find("'" + command + ":"), std::string::npos) << command;
+    EXPECT_NE(fish.find(" -a " + command + " "), std::string::npos) << command;
+    for (const auto& option : options_of(folder, command)) {
+      EXPECT_NE(zsh.find("'" + option + "["), std::string::npos) << option;
+      EXPECT_NE(fish.find(" -l " + option.substr(2) + " "), std::string::npos) << option;
+    }
+  }
+  folder.put("z", zsh);
+  folder.put("f", fish);
+  const auto [code, out] = in_bash(folder, "! command -v zsh >/dev/null || zsh -n z || exit 1; ! command -v fish >/dev/null || fish -n f");
+  EXPECT_EQ(code, 0) << out;
+  expect_refusal(folder, {"completion", "tcsh"}, 2, "bash, zsh, fish");
+}
+
+TEST(CliTerminal, TheManPageHasWhatTheHelpHas) {
+  const TemporaryFolder folder;
+  const auto page = run_swarmfit(folder, {"man"});
+  ASSERT_EQ(page.code, 0) << page.err;
+  EXPECT_NE(page.out.find("\n.TH SWARMFIT 1 "), std::string::npos);
+  std::string plain = page.out;
+  for (std::size_t at; (at = plain.find("\\-")) != std::string::npos;) plain.erase(at, 1);
+  for (const auto& command : kCommands) {
+    EXPECT_NE(plain.find("\n.SS swarmfit " + command + " "), std::string::npos) << command;
+    for (const auto& option : options_of(folder, command)) EXPECT_NE(plain.find(option), std::string::npos) << option;
+  }
+  // No line is taken for a request that is none.
+  static const std::regex request(R"(\n[.'](?!\\"|TH|SH|SS|TP|PP|B |I |nf|fi|sp))");
+  EXPECT_FALSE(std::regex_search(page.out, request));
+  folder.put("swarmfit.1", page.out);
+  const auto [code, out] = in_bash(folder,
+                                   "if command -v man >/dev/null && command -v groff >/dev/null; then\n"
+                                   "  MANWIDTH=80 man --warnings=w -l swarmfit.1 2>complaints >/dev/null || exit 1\n"
+                                   "  cat complaints; ! [ -s complaints ]\nfi\n");
+  EXPECT_EQ(code, 0) << out;
+}
+
+TEST(CliTerminal, TheDoctorSaysWhetherFitCanRun) {
+  const TemporaryFolder folder;
+  const auto well = run_swarmfit(folder, {"doctor", "--backend", "cpu"});
+  EXPECT_EQ(well.code, 0) << well.out << well.err;
+  EXPECT_EQ(well.err, "");
+  for (const char* what : {"cpu takes cpu", "the 3 planes of a corner", "SIMD", "threads", "Vulkan loader", "pipeline cache", "OpenCV"})
+    EXPECT_NE(well.out.find(what), std::string::npos) << what << "\n" << well.out;
+  const auto ill = run_swarmfit(folder, {"doctor", "--backend", "abacus"});
+  EXPECT_EQ(ill.code, 4) << ill.out;
+  EXPECT_NE(ill.out.find("fit cannot run"), std::string::npos) << ill.out;
+  for (const auto& outcome : {well, ill}) {
+    EXPECT_EQ(outcome.out.find('\033'), std::string::npos);
+    std::istringstream lines(outcome.out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+  }
+}
+
+TEST(CliTerminal, VerboseTellsOnStderrAndAPipeGetsNoColours) {
+  const TemporaryFolder folder;
+  std::string points;
+  for (int i = 0; i < 400; ++i) points += std::to_string(0.05 * (i % 20)) + " " + std::to_string(0.05 * (i / 20)) + " 0\n";
+  folder.put("c.xyz", points);
+  const auto outcome = run_swarmfit(folder, {"fit", "plane", "c.xyz", "--verbose", "--quiet", "--backend", "cpu"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  for (const char* what : {"back end   cpu on", "threshold  0.01", "model 1", "round", "times      back end"})
+    EXPECT_NE(outcome.err.find(what), std::string::npos) << what << "\n" << outcome.err;
+  const auto plain = run_swarmfit(folder, {"fit", "plane", "c.xyz"}), wrong = run_swarmfit(folder, {"fit", "blob", "c.xyz"});
+  for (const auto& text : {outcome.err, plain.out, plain.err, wrong.err}) EXPECT_EQ(text.find('\033'), std::string::npos) << text;
+  std::istringstream lines(plain.out);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("  ")) EXPECT_LE(line.size(), 80U) << line;
+  }
+}
+
+}  // namespace
