@@ -38,6 +38,11 @@ TEST(CliUsage, UnknownWords) {
   expect_refusal(folder, {"fit"}, 2, "model");
   expect_refusal(folder, {"fit", "plane"}, 2, "input");
   expect_refusal(folder, {"fit", "blob", "c.xyz"}, 2, "blob");
+  expect_refusal(folder, {"fit", "plane,blob", "c.xyz"}, 2, "blob");
+  expect_refusal(folder, {"fit", "plane,line2d", "c.xyz"}, 2, "line2d");
+  expect_refusal(folder, {"fit", "plane,plane", "c.xyz"}, 2, "once");
+  expect_refusal(folder, {"fit", "plane", "c.xyz", "--model", "sphere"}, 2, "--model");
+  expect_refusal(folder, {"fit", "--model", "sphere"}, 2, "input");
   expect_refusal(folder, {"fit", "plane", "c.xyz", "--frobnicate"}, 2, "--frobnicate");
   expect_refusal(folder, {"fit", "plane", "c.xyz", "more"}, 2, "more");
   expect_refusal(folder, {"devices", "more"}, 2, "more");

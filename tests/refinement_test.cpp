@@ -44,9 +44,9 @@ class Refinement : public testing::Test {
     return space_->from_data(data, points_.frame());
   }
   /// Sum of min(tau, distance to the nearest), straight from the reference.
-  double energy(const std::vector<models::Position>& lines) {
+  double energy(const std::vector<models::Placed>& lines) {
     std::vector<float> least = caps_, distances(points_.size());
-    for (const models::Position& line : lines) {
+    for (const auto& [space, line] : lines) {
       const Eigen::VectorXd data = space_->to_data(line, points_.frame());
       EXPECT_TRUE(evaluator_->distances({space_->kind(), std::span<const double>(data.data(), 3)}, distances));
       for (std::size_t i = 0; i < least.size(); ++i) least[i] = std::min(least[i], distances[i]);
@@ -93,7 +93,7 @@ TEST_F(Refinement, PointsAlreadyExplainedAreLeftOut) {
 TEST_F(Refinement, JointEnergyNeverRises) {
   const Ground ground{*evaluator_, *space_, points_, kTau};
   for (const double turn : {-0.03, 0.0, 0.02, 0.2}) {
-    std::vector<models::Position> lines{off(0.4, 0.2, turn, 0.01), off(0.6, -0.3, -turn, -0.005)};
+    std::vector<models::Placed> lines{{space_.get(), off(0.4, 0.2, turn, 0.01)}, {space_.get(), off(0.6, -0.3, -turn, -0.005)}};
     const double before = energy(lines);
     const auto told = refine_jointly(ground, lines);
     ASSERT_TRUE(told);
@@ -105,7 +105,8 @@ TEST_F(Refinement, JointEnergyNeverRises) {
 TEST_F(Refinement, UniqueSupportOfTwinsIsNothing) {
   const Ground ground{*evaluator_, *space_, points_, kTau};
   const models::Position line = off(0.4, 0.2, 0, 0), twin = off(0.4, 0.2, 1e-5, 0), other = off(0.6, -0.3, 0, 0);
-  const auto unique = unique_support(ground, {line, twin, other});
+  const auto unique =
+      unique_support(ground, std::vector<models::Placed>{{space_.get(), line}, {space_.get(), twin}, {space_.get(), other}});
   ASSERT_TRUE(unique);
   EXPECT_LT((*unique)[0], 3U);
   EXPECT_LT((*unique)[1], 3U);

@@ -1,9 +1,12 @@
-// swarmfit fit MODEL INPUT
+// swarmfit fit MODEL INPUT, or swarmfit fit INPUT --model MODEL
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -21,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct FitArguments {
-  std::string model, input, normal, within;
+  std::string model, input, option, normal, within;
   VerticalFlags vertical;
   FitFlags fit;
   OutputFlags output;
@@ -40,7 +43,8 @@ Expected<> apply_prior(const FitArguments& arguments, FitOptions& options) {
   if (arguments.normal.empty() && arguments.within.empty() && !vertical) return {};
   if (arguments.normal.empty() && !vertical) return invalid("--within needs --normal, the direction it is measured from");
   if (!arguments.normal.empty() && vertical) return invalid("--normal excludes --gravity and --camera-tilt");
-  if (vertical && options.model != ModelType::plane)
+  const std::vector<ModelType> kinds = options.kinds();
+  if (vertical && std::find(kinds.begin(), kinds.end(), ModelType::plane) == kinds.end())
     return invalid(fmt::format("--gravity and --camera-tilt are for horizontal planes, not for {}", arguments.model));
   const std::size_t columns = dimension(options.model) == 2 ? 2 : 3;
   DirectionPrior prior;
@@ -66,9 +70,10 @@ Expected<> apply_prior(const FitArguments& arguments, FitOptions& options) {
 
 Expected<FitOptions> fit_options(const FitArguments& arguments) {
   FitOptions options;
-  const auto model = model_type(arguments.model);
-  if (!model) return tl::unexpected(model.error());
-  options.model = *model;
+  const auto kinds = model_types(arguments.model);
+  if (!kinds) return tl::unexpected(kinds.error());
+  options.model = kinds->front();
+  options.rivals.assign(kinds->begin() + 1, kinds->end());
   if (auto ok = apply_prior(arguments, options); !ok) return tl::unexpected(ok.error());
   if (auto ok = arguments.fit.apply(options); !ok) return tl::unexpected(ok.error());
   if (is_png(arguments.input)) {
@@ -99,7 +104,22 @@ Expected<> write(const FitArguments& arguments, const FitResult& result, const C
   return write_labels(fs::path(output.out) / "labels.txt", result.labels);
 }
 
-int run(const FitArguments& arguments) {
+/// MODEL INPUT, or --model MODEL with INPUT alone.
+Expected<> tell_apart(FitArguments& arguments) {
+  const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
+  if (!arguments.option.empty()) {
+    if (!arguments.input.empty())
+      return invalid(fmt::format("--model: {}, must not be given beside {}", arguments.option, arguments.model));
+    arguments.input = std::exchange(arguments.model, arguments.option);
+  } else if (arguments.model.empty()) {
+    return invalid("model is missing, must be given: swarmfit fit MODEL INPUT (swarmfit fit --help tells more)");
+  }
+  if (arguments.input.empty()) return invalid("input is missing, must be given: swarmfit fit MODEL INPUT (swarmfit fit --help tells more)");
+  return {};
+}
+
+int run(FitArguments& arguments) {
+  if (auto ok = tell_apart(arguments); !ok) return complain(ok.error());
   const auto options = fit_options(arguments);
   if (!options) return complain(options.error());
   if (auto ok = arguments.output.check(); !ok) return complain(ok.error());
@@ -149,15 +169,15 @@ int run(const FitArguments& arguments) {
 
 Command add_fit(CLI::App& app) {
   auto arguments = std::make_shared<FitArguments>();
-  CLI::App* sub = app.add_subcommand("fit", "Find all models of one kind");
+  CLI::App* sub = app.add_subcommand("fit", "Find all models of a kind, or of several");
   std::string models;
   for (const ModelType type : model_types()) models += (models.empty() ? "" : ", ") + std::string(name(type));
-  sub->add_option("model", arguments->model, "What to find: " + models)->type_name("MODEL")->required();
+  sub->add_option("model", arguments->model, "What to find: " + models + "; several, parted by commas, compete")->type_name("MODEL");
   sub->add_option(
          "input", arguments->input,
          ".pcd .ply .xyz .csv (x,y or x,y,z or x1,y1,x2,y2; a header is optional, a column named label is ignored), or a 16-bit depth .png")
-      ->type_name("INPUT")
-      ->required();
+      ->type_name("INPUT");
+  sub->add_option("--model", arguments->option, "What to find, with INPUT alone")->type_name("MODEL")->group("How models are found");
   sub->add_option("--normal", arguments->normal, "Only models whose normal is near this direction (line2d: X,Y)")
       ->type_name("X,Y,Z")
       ->group("How models are found");
@@ -170,6 +190,7 @@ Command add_fit(CLI::App& app) {
       "examples:\n"
       "  swarmfit fit plane scan.ply --threshold 0.02 --labels labels.txt\n"
       "  swarmfit fit plane cloud.pcd --normal 0,0,1 --within 10 --json result.json\n"
+      "  swarmfit fit plane,cylinder,sphere scan.ply\n"
       "  swarmfit fit line2d points.csv --threshold auto\n"
       "  swarmfit fit plane depth.png --intrinsics 525,525,319.5,239.5 --depth-scale 0.001");
   return {sub, [arguments] { return run(*arguments); }};

@@ -68,6 +68,11 @@ class Cylinder final : public CurvedSpace {
     velocity.segment<3>(3) = v;
   }
 
+  Vector outward(const Position& theta, const Vector& point) const override {
+    const Vector axis = theta.segment<3>(3), arm = point - theta.head<3>();
+    return arm - axis.dot(arm) * axis;
+  }
+
   Position to_data(const Position& theta, const Frame& frame) const override {
     Position parameters = theta;
     parameters.head<3>() *= frame.scale;

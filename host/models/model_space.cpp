@@ -67,4 +67,16 @@ Expected<ModelType> model_type(std::string_view wanted) {
   return fail(Error::Kind::invalid_option, fmt::format("model is '{}', must be one of: {}", wanted, known));
 }
 
+Expected<std::vector<ModelType>> model_types(std::string_view names) {
+  std::vector<ModelType> types;
+  for (std::size_t start = 0; start <= names.size();) {
+    const std::size_t comma = std::min(names.find(',', start), names.size());
+    const auto type = model_type(names.substr(start, comma - start));
+    if (!type) return tl::unexpected(type.error());
+    types.push_back(*type);
+    start = comma + 1;
+  }
+  return types;
+}
+
 }  // namespace swarmfit

@@ -67,6 +67,9 @@ class ModelSpace {
   /// in closed form `support` is not looked at beyond its size.
   virtual double noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double squares) const;
 
+  /// Of a surface in space: where its normal points at what is near this point, not of unit length. Zero of other kinds.
+  virtual Eigen::Vector3d outward(const Position&, const Eigen::Vector3d&) const { return Eigen::Vector3d::Zero(); }
+
   /// Parameters in the data's frame and unit, as results and kernels take them, and back.
   virtual Position to_data(const Position& theta, const Frame& frame) const = 0;
   virtual Position from_data(const Position& parameters, const Frame& frame) const = 0;
@@ -75,6 +78,12 @@ class ModelSpace {
 
   /// Pulls a position back inside the prior, if there is one; false where that cannot be done.
   virtual bool admit(Position& theta) const = 0;
+};
+
+/// A model of one of several kinds.
+struct Placed {
+  const ModelSpace* space = nullptr;  ///< never null but in an empty place
+  Position theta;
 };
 
 /// The space of a kind, with an optional prior on its direction.

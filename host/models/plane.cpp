@@ -8,6 +8,7 @@ class Plane final : public Hyperplane<3> {
   using Hyperplane::Hyperplane;
   ModelType type() const noexcept override { return ModelType::plane; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::plane; }
+  Eigen::Vector3d outward(const Position& theta, const Eigen::Vector3d&) const override { return theta.head<3>(); }
 };
 
 }  // namespace

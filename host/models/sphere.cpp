@@ -7,6 +7,7 @@ class Sphere final : public Round<3> {
  public:
   ModelType type() const noexcept override { return ModelType::sphere; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::sphere; }
+  Eigen::Vector3d outward(const Position& theta, const Eigen::Vector3d& point) const override { return point - theta.head<3>(); }
 };
 
 }  // namespace

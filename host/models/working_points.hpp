@@ -56,6 +56,7 @@ class WorkingPoints {
 
   /// Unit normals, one a point; those that are not known are zero. None are known until they are set.
   void set_normals(std::vector<Eigen::Vector3f> normals) noexcept { normals_ = std::move(normals); }
+  bool has_normals() const noexcept { return !normals_.empty(); }
   Eigen::Vector3d normal(std::size_t i) const noexcept {
     return normals_.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(normals_[i].cast<double>());
   }

@@ -1,4 +1,5 @@
 // The public face of the fit: options and points are checked here, the work is done in multi_model.cpp.
+#include <algorithm>
 #include <cmath>
 #include <new>
 
@@ -7,6 +8,7 @@
 #include <swarmfit/fit.hpp>
 
 #include "host/models/model_space.hpp"
+#include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_scale.hpp"
 #include "host/swarm/settings.hpp"
@@ -50,6 +52,35 @@ Expected<> check_points(const PointsView& points, const models::WorkingPoints& w
                             kShapes[working.rank()], working.rank(), space.least_rank(), name(space.type())));
   }
   return {};
+}
+
+/// Enough if one of the kinds can be fitted; else what the first lacks.
+Expected<> check_points(const PointsView& points, const models::WorkingPoints& working, std::span<const swarm::Kind> kinds) {
+  const auto first = check_points(points, working, *kinds.front().space);
+  const bool any = std::any_of(kinds.begin(), kinds.end(), [&](const swarm::Kind& kind) {
+    return !kind.hidden && check_points(points, working, *kind.space).has_value();
+  });
+  return any ? Expected<>() : first;
+}
+
+/// Whose samples ask most of a cloud.
+const models::ModelSpace& keenest(std::span<const swarm::Kind> kinds) {
+  const auto keen = std::find_if(kinds.begin(), kinds.end(), [](const swarm::Kind& kind) { return kind.space->needs_normals(); });
+  return *(keen == kinds.end() ? kinds.front() : *keen).space;
+}
+
+Expected<> check_backend(const kernels::FitnessEvaluator& evaluator, std::span<const swarm::Kind> kinds, std::size_t points) {
+  for (const swarm::Kind& kind : kinds) {
+    const kernels::Workload workload{kind.space->kind(), points, static_cast<std::size_t>(kind.settings.particles)};
+    if (const auto support = evaluator.supports(workload); !support) return fail(Error::Kind::backend_unavailable, support.reason);
+  }
+  return {};
+}
+
+/// The same models in another cloud's frame.
+std::vector<models::Placed> moved(std::vector<models::Placed> models, const models::Frame& from, const models::Frame& to) {
+  for (auto& [space, theta] : models) theta = space->from_data(space->to_data(theta, from), to);
+  return models;
 }
 
 Expected<models::WorkingPoints> survey(kernels::FitnessEvaluator& evaluator, const PointsView& points) {
@@ -116,7 +147,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   limits.stop = std::move(stop);
   limits.max_models = state_->options.max_models;
   const FitOptions& options = state_->options;
-  const auto space = models::make_space(options.model, options.prior);
+  std::vector<swarm::Kind> kinds = swarm::make_kinds(options);
   if (points.dimension() != dimension(options.model)) {
     return fail(Error::Kind::bad_input, fmt::format("points have {} columns, must have {} to fit a {}", points.dimension(),
                                                     dimension(options.model), name(options.model)));
@@ -124,8 +155,9 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   kernels::FitnessEvaluator& evaluator = *state_->evaluator;
   auto whole = survey(evaluator, points);
   if (!whole) return tl::unexpected(whole.error());
-  if (auto ok = check_points(points, *whole, *space); !ok) return tl::unexpected(ok.error());
-  swarm::Settings settings = swarm::resolve(options, whole->finite_count(), 1.0);
+  if (auto ok = check_points(points, *whole, kinds); !ok) return tl::unexpected(ok.error());
+  swarm::resolve(kinds, options, whole->finite_count(), 1.0);
+  const swarm::Settings& settings = kinds.front().settings;
 
   const swarm::Random random(options.seed);
   std::optional<swarm::Rows> thin_rows;
@@ -138,28 +170,29 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   }
   models::WorkingPoints& working = thin_rows ? thin : *whole;
   const bool searches_part = settings.searches_part(working.finite_count());
-  const swarm::Part part = swarm::look_closely(working, *space, random, searches_part ? settings.search_points : swarm::kSampledFrom);
-  const kernels::Workload workload{space->kind(), searches_part ? part.points.index().size() : working.size(),
-                                   static_cast<std::size_t>(settings.particles)};
-  if (const auto support = evaluator.supports(workload); !support) return fail(Error::Kind::backend_unavailable, support.reason);
+  const swarm::Part part =
+      swarm::look_closely(working, keenest(kinds), random, searches_part ? settings.search_points : swarm::kSampledFrom);
+  const std::size_t searched = searches_part ? part.points.index().size() : working.size();
+  if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 
   FitResult result;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
   if (options.estimate_threshold || !given) {
-    auto estimated = swarm::estimate_threshold(evaluator, *space, working, part, whole->finite_count(), options);
+    auto estimated = swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options);
     if (!estimated) return tl::unexpected(estimated.error());
     result.threshold = *estimated;
   } else {
     result.threshold = *given;
   }
-  settings = swarm::resolve(options, whole->finite_count(), result.threshold);
-  swarm::MultiModel search(evaluator, *space, working, part, settings, options.seed, limits);
+  swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
+  swarm::MultiModel search(evaluator, kinds, working, part, options.seed, limits);
   if (auto done = search.run(on_model, warm_start, result); !done) return tl::unexpected(done.error());
-  std::vector<models::Position> found = search.found();
-  const swarm::Ground ground{evaluator, *space, *whole, static_cast<float>(result.threshold)};
+  std::vector<models::Placed> found = search.found();
+  const swarm::Ground ground{evaluator, *kinds.front().space, *whole, static_cast<float>(result.threshold)};
   if (thin_rows) {
-    for (models::Position& theta : found) theta = space->from_data(space->to_data(theta, working.frame()), whole->frame());
-    if (auto done = swarm::refit(ground, found); !done) return tl::unexpected(done.error());
+    found = moved(std::move(found), working.frame(), whole->frame());
+    const std::vector<models::Placed> hidden = moved(search.hidden(), working.frame(), whole->frame());
+    if (auto done = swarm::refit(ground, found, search.shares_points(), hidden); !done) return tl::unexpected(done.error());
   }
   result.labels = thin_rows ? std::vector<std::uint16_t>{} : search.labels();
   if (auto done = swarm::settle(ground, found, result); !done) return tl::unexpected(done.error());

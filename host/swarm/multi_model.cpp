@@ -21,22 +21,22 @@ constexpr int kFullRounds = 1;                        // of refinement on all po
 
 }  // namespace
 
-MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points,
-                       const Part& part, const Settings& settings, std::uint64_t seed, Limits limits)
+MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points,
+                       const Part& part, std::uint64_t seed, Limits limits)
     : evaluator_(evaluator),
-      space_(space),
+      kinds_(kinds),
+      asked_(static_cast<std::size_t>(std::count_if(kinds.begin(), kinds.end(), [](const Kind& kind) { return !kind.hidden; }))),
       points_(points),
-      settings_(settings),
+      settings_(kinds.front().settings),
       random_(seed),
       limits_(std::move(limits)),
       part_(part.points),
       neighbours_(part.neighbours),
-      part_searched_(settings.searches_part(points.finite_count())),
-      landscape_(evaluator, space, points.frame(), settings),
-      tau_(static_cast<float>(settings.threshold)),
-      ground_{evaluator, space, points, tau_},
-      part_ground_{evaluator, space, points, tau_, &part_},
-      distances_(points.size()) {
+      part_searched_(settings_.searches_part(points.finite_count())),
+      tau_(static_cast<float>(settings_.threshold)),
+      ground_{evaluator, *kinds.front().space, points, tau_},
+      part_ground_{evaluator, *kinds.front().space, points, tau_, &part_} {
+  for (const Kind& kind : kinds_) landscapes_.emplace_back(evaluator, *kind.space, points.frame(), kind.settings);
   restore_caps();
 }
 
@@ -53,9 +53,9 @@ std::optional<std::string> MultiModel::interrupted() const {
   return std::nullopt;
 }
 
-Expected<> MultiModel::show_caps() {
-  part_.gather(caps_, part_caps_);
-  if (auto done = evaluator_.set_caps(part_searched_ ? part_caps_ : caps_); !done) return tl::unexpected(to_error(done.error()));
+Expected<> MultiModel::show(std::span<const float> caps) {
+  part_.gather(caps, part_caps_);
+  if (auto done = evaluator_.set_caps(part_searched_ ? part_caps_ : caps); !done) return tl::unexpected(to_error(done.error()));
   return {};
 }
 
@@ -68,11 +68,14 @@ void MultiModel::count_effort(FitResult& result) const {
 
 Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result) {
   if (auto done = evaluator_.set_points(searched().view()); !done) return tl::unexpected(to_error(done.error()));
-  if (auto done = show_caps(); !done) return done;
-  std::vector<models::Position> seeds;
+  if (auto done = show(caps_); !done) return done;
+  Seeds seeds(kinds_.size());
   for (const Model& model : warm_start) {
-    models::Position theta = space_.from_data(model.parameters, points_.frame());
-    if (space_.admit(theta)) seeds.push_back(std::move(theta));
+    for (std::size_t kind = 0; kind < asked_; ++kind) {
+      if (space(kind).type() != model.type || space(kind).parameter_count() != model.parameters.size()) continue;
+      models::Position theta = space(kind).from_data(model.parameters, points_.frame());
+      if (space(kind).admit(theta)) seeds[kind].push_back(std::move(theta));
+    }
   }
   int unpaid = 0;
   while (stop_reason_.empty()) {
@@ -80,19 +83,21 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
       stop_reason_ = "max-models reached";
       break;
     }
-    models::Position theta;
-    double loss = 0;
-    auto outcome = search(round_++, seeds, theta, loss);
+    Candidate best;
+    auto outcome = search(seeds, best);
     if (!outcome) return tl::unexpected(outcome.error());
     if (*outcome == Outcome::interrupted) break;
-    if (*outcome == Outcome::found) {
+    if (*outcome == Outcome::found || *outcome == Outcome::flat) {
       unpaid = 0;
-      auto go_on = accept(theta, loss, on_model, result);
+      const bool kept = *outcome == Outcome::found;
+      auto go_on = kept ? accept(best, on_model, result) : Expected<bool>(true);
       if (!go_on) return tl::unexpected(go_on.error());
+      if (!kept) hidden_.push_back({&space(best.kind), best.theta});
+      if (auto done = deflate(best); !done) return tl::unexpected(done.error());
       if (!*go_on) stop_reason_ = "stopped by the caller";
       continue;
     }
-    if (settings_.deflation == Deflation::parametric) landscape_.deflate_around(theta);
+    if (settings_.deflation == Deflation::parametric) landscapes_[best.kind].deflate_around(best.theta);
     if (*outcome == Outcome::complete) {
       stop_reason_ = "complete: the list of global bests is stable";
     } else if (++unpaid >= settings_.patience) {
@@ -103,20 +108,22 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
   return finish(result);
 }
 
-double MultiModel::loss_of_nothing() const {
+double MultiModel::loss_of_nothing(std::span<const float> caps) const {
   if (settings_.deflation == Deflation::parametric) {
     return settings_.threshold * static_cast<double>(part_searched_ ? part_.index().size() : points_.finite_count());
   }
   double sum = 0;
-  for (const float cap : part_searched_ ? part_caps_ : caps_) sum += static_cast<double>(cap);
+  for (const float cap : part_searched_ ? std::span<const float>(part_caps_) : caps) sum += static_cast<double>(cap);
   return sum;
 }
 
-Expected<bool> MultiModel::fly(Swarm& swarm, std::uint32_t round, std::span<const models::Position> seeds, float alive) {
-  Sampler sampler(points_, part_.index(), neighbours_, space_, random_);
-  sampler.prefer_unexplained(caps_, alive);
-  scale_ = loss_of_nothing();
-  steps_ = 0;
+Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
+                               std::span<const float> caps, float alive) {
+  // Normals bring neighbourhoods that are too close for a kind which has no use for them.
+  const bool close = points_.dimension() > 3 || space(kind).needs_normals();
+  Sampler sampler(points_, part_.index(), close ? neighbours_ : none_, space(kind), random_);
+  sampler.prefer_unexplained(caps, alive);
+  scale_ = loss_of_nothing(caps);
   if (!swarm.start(sampler, round, seeds)) {
     stop_reason_ = "complete: what is left determines no model";
     return false;
@@ -126,68 +133,93 @@ Expected<bool> MultiModel::fly(Swarm& swarm, std::uint32_t round, std::span<cons
       stop_reason_ = *reason;
       return false;
     }
-    if (auto done = swarm.step(landscape_, sampler, scale_); !done) return tl::unexpected(done.error());
+    if (auto done = swarm.step(landscapes_[kind], sampler, scale_); !done) return tl::unexpected(done.error());
   }
-  steps_ = static_cast<std::size_t>(swarm.steps());
+  steps_ += static_cast<std::size_t>(swarm.steps());
   return true;
 }
 
-Expected<MultiModel::Outcome> MultiModel::search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta,
-                                                 double& loss) {
-  Swarm swarm(space_, settings_, random_);
-  auto flown = fly(swarm, round, seeds, kUnexplained * tau_);
+Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate) {
+  const Settings& settings = kinds_[candidate.kind].settings;
+  Swarm swarm(space(candidate.kind), settings, random_);
+  auto flown = fly(swarm, candidate.kind, round, seeds, caps_, kUnexplained * tau_);
   if (!flown) return tl::unexpected(flown.error());
   if (!*flown) return Outcome::interrupted;
-  theta = swarm.best();
+  candidate.theta = swarm.best();
   if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
-  if (auto done = refine(theta, loss); !done) return tl::unexpected(done.error());
-  support_ = count_support(distances_, caps_, tau_, nearest_);
-  if (pays(support_, settings_, space_.minimal_sample())) return Outcome::found;
+  if (auto done = refine(candidate); !done) return tl::unexpected(done.error());
+  if (pays(candidate.support, settings, space(candidate.kind).minimal_sample())) return Outcome::found;
   const auto& list = swarm.global_bests();
   const bool stable = list.front().fitness - list.back().fitness < kStable * scale_;
   return settings_.deflation == Deflation::parametric && stable ? Outcome::complete : Outcome::unpaid;
 }
 
+Expected<MultiModel::Outcome> MultiModel::search(const Seeds& seeds, Candidate& best) {
+  Outcome reached = Outcome::interrupted;
+  steps_ = 0;
+  for (std::size_t kind = 0; kind < asked_; ++kind) {
+    Candidate candidate;
+    candidate.kind = kind;
+    auto outcome = explore(round_++, seeds[kind], candidate);
+    if (!outcome) return outcome;
+    if (*outcome == Outcome::interrupted) {
+      if (interrupted()) return outcome;
+      continue;  // what is left determines no model of this kind
+    }
+    if (reached == Outcome::interrupted || (*outcome == Outcome::found && (reached != Outcome::found || worth(candidate) > worth(best)))) {
+      best = std::move(candidate);
+    }
+    reached = std::max(reached, *outcome);
+  }
+  if (reached != Outcome::interrupted) stop_reason_.clear();
+  if (kinds_.size() > 1 && reached == Outcome::found) return contest(best);
+  if (kinds_.back().hidden && reached <= Outcome::unpaid) return look_flat(best, reached);
+  return reached;
+}
+
 int MultiModel::full_rounds() const noexcept { return part_searched_ ? kFullRounds : kMostRounds; }
 
-Expected<> MultiModel::refine(models::Position& theta, double& loss) {
+Expected<> MultiModel::refine(Candidate& candidate) {
+  models::Position& theta = candidate.theta;
   if (part_searched_ && settings_.refine) {
-    if (auto done = refine_one(part_ground_, settings_.loss, part_caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
+    const Ground part = part_ground_.of(space(candidate.kind));
+    if (auto done = refine_one(part, settings_.loss, part_caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
   }
-  auto least = refine_one(ground_, settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0, &distances_);
+  auto least = refine_one(whole(candidate.kind), settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0, &candidate.distances);
   if (!least) return tl::unexpected(least.error());
-  loss = *least;
+  candidate.loss = *least;
+  candidate.support = count_support(candidate.distances, caps_, tau_, nearest_);
   return {};
 }
 
-Expected<bool> MultiModel::accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result) {
+Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result) {
   const std::size_t evaluations_before = result.evaluations;
   count_effort(result);
   Model model;
-  model.type = space_.type();
-  model.parameters = space_.to_data(theta, points_.frame());
-  model.cost = loss * settings_.stands_for;
+  model.type = space(candidate.kind).type();
+  model.parameters = space(candidate.kind).to_data(candidate.theta, points_.frame());
+  model.cost = candidate.loss * settings_.stands_for;
   model.iterations = steps_;
   model.evaluations = result.evaluations - evaluations_before;
   model.points_touched = result.points_touched;
   model.found_at_ms = elapsed_ms();
-  const auto inliers = static_cast<double>(support_.inliers());
+  const auto inliers = static_cast<double>(candidate.support.inliers());
   model.inliers = static_cast<std::size_t>(std::lround(inliers * settings_.stands_for));
-  model.rms = inliers > 0 ? std::sqrt(support_.square / inliers) : 0.0;
-  found_.push_back(theta);
+  model.rms = inliers > 0 ? std::sqrt(candidate.support.square / inliers) : 0.0;
+  found_.push_back({&space(candidate.kind), candidate.theta});
   result.models.push_back(model);
   result.iterations += steps_;
-  if (settings_.deflation == Deflation::parametric) landscape_.deflate_around(theta);
-  if (auto done = deflate(); !done) return tl::unexpected(done.error());
+  if (settings_.deflation == Deflation::parametric) landscapes_[candidate.kind].deflate_around(candidate.theta);
   return !on_model || on_model(result.models.back()) == Verdict::go_on;
 }
 
-Expected<> MultiModel::deflate() {
-  nearest_.resize(distances_.size(), std::numeric_limits<float>::infinity());
-  for (std::size_t i = 0; i < nearest_.size(); ++i) nearest_[i] = distances_[i] < nearest_[i] ? distances_[i] : nearest_[i];
-  swarm::deflate(distances_, tau_, tail_reach(support_), settings_.dead_zone_slope, caps_);
+Expected<> MultiModel::deflate(const Candidate& candidate) {
+  const std::vector<float>& distances = candidate.distances;
+  nearest_.resize(distances.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t i = 0; i < nearest_.size(); ++i) nearest_[i] = distances[i] < nearest_[i] ? distances[i] : nearest_[i];
+  swarm::deflate(distances, tau_, tail_reach(candidate.support), settings_.dead_zone_slope, caps_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
-  return show_caps();
+  return show(caps_);
 }
 
 Expected<> MultiModel::finish(FitResult& result) {
@@ -199,7 +231,8 @@ Expected<> MultiModel::finish(FitResult& result) {
       if (auto energy = refine_jointly(ground_, found_); !energy) return tl::unexpected(energy.error());
     }
     if (auto done = drop_unpaid(result); !done) return done;
-    for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
+    for (std::size_t m = 0; m < found_.size(); ++m)
+      result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
   }
   count_effort(result);
   return {};
@@ -216,19 +249,19 @@ Expected<> MultiModel::search_further(Labelling& labelling) {
     std::fill(caps_.begin(), caps_.end(), 0.0F);
     labelling.costs(caps_);
     for (float& cap : caps_) cap *= tau_;
-    if (auto done = show_caps(); !done) return done;
-    Swarm swarm(space_, settings_, random_);
-    auto flown = fly(swarm, round_++, {}, kAnyPoint);
+    if (auto done = show(caps_); !done) return done;
+    Swarm swarm(space(0), settings_, random_);
+    auto flown = fly(swarm, 0, round_++, {}, caps_, kAnyPoint);
     if (!flown) return tl::unexpected(flown.error());
     if (!*flown) {
       if (!interrupted()) stop_reason_ = before;
       return {};
     }
-    models::Position theta = swarm.best();
-    double loss = 0;
-    if (auto done = refine(theta, loss); !done) return done;
+    Candidate candidate;
+    candidate.theta = swarm.best();
+    if (auto done = refine(candidate); !done) return done;
     std::vector<models::Position> proposals(swarm.own_bests().begin(), swarm.own_bests().end());
-    proposals.push_back(std::move(theta));
+    proposals.push_back(std::move(candidate.theta));
     auto joined = labelling.offer(proposals);
     if (!joined) return tl::unexpected(joined.error());
     if (!*joined) return {};
@@ -238,19 +271,22 @@ Expected<> MultiModel::search_further(Labelling& labelling) {
 
 Expected<> MultiModel::share_out(FitResult& result) {
   Labelling labelling(ground_, part_, neighbours_, settings_.prices);
-  if (auto done = labelling.start(found_); !done) return done;
+  std::vector<models::Position> start;
+  for (const models::Placed& model : found_) start.push_back(model.theta);
+  if (auto done = labelling.start(start); !done) return done;
   if (auto joined = labelling.offer(proposals_); !joined) return tl::unexpected(joined.error());
   if (auto done = search_further(labelling); !done) return done;
   if (auto done = labelling.drop(); !done) return done;
-  found_ = labelling.models();
+  found_.clear();
+  for (const models::Position& theta : labelling.models()) found_.push_back({&space(0), theta});
   std::vector<Model> kept;
   for (const std::size_t m : labelling.kept()) {
     kept.emplace_back();
     if (m != Labelling::kJoined) kept.back() = std::move(result.models[m]);
-    kept.back().type = space_.type();
+    kept.back().type = space(0).type();
   }
   result.models = std::move(kept);
-  for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = space_.to_data(found_[m], points_.frame());
+  for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
   labels_.resize(points_.size());
   labelling.write(labels_);
   count_effort(result);
@@ -258,19 +294,31 @@ Expected<> MultiModel::share_out(FitResult& result) {
 }
 
 Expected<> MultiModel::polish() {
-  // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs.
+  // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs. Not so among kinds: a ball
+  // lies along the table that it lies on.
   restore_caps();
-  for (models::Position& theta : found_) {
-    if (auto done = refine_one(ground_, settings_.loss, caps_, theta, full_rounds()); !done) return tl::unexpected(done.error());
+  std::vector<std::vector<float>> distances;
+  if (shares_points()) {
+    std::vector<models::Placed> all = found_;
+    all.insert(all.end(), hidden_.begin(), hidden_.end());
+    auto measured = measure(ground_, all);
+    if (!measured) return tl::unexpected(measured.error());
+    distances = std::move(*measured);
   }
+  const auto refine_all = [&](float corner, int rounds) -> Expected<> {
+    for (std::size_t m = 0; m < found_.size(); ++m) {
+      if (!distances.empty()) left_by_others(distances, m, tau_, caps_);
+      Ground ground = ground_.of(*found_[m].space);
+      ground.corner = corner;
+      if (auto done = refine_one(ground, settings_.loss, caps_, found_[m].theta, rounds); !done) return tl::unexpected(done.error());
+    }
+    return {};
+  };
+  if (auto done = refine_all(ground_.corner, full_rounds()); !done) return done;
   if (part_searched_ || settings_.loss != Loss::truncated_l1 || shares_out()) return {};
   // Few points leave the least absolute deviations well apart from what rounded corners make of them.
-  Ground sharp = ground_;
   for (const float corner : kSharper) {
-    sharp.corner = corner;
-    for (models::Position& theta : found_) {
-      if (auto done = refine_one(sharp, settings_.loss, caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
-    }
+    if (auto done = refine_all(corner, kMostRounds); !done) return done;
   }
   return {};
 }

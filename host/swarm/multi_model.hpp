@@ -3,12 +3,14 @@
 
 #include <chrono>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
 #include <swarmfit/fit.hpp>
 
 #include "host/models/model_space.hpp"
+#include "host/swarm/kinds.hpp"
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/random.hpp"
@@ -33,27 +35,46 @@ struct Limits {
 
 class MultiModel {
  public:
-  /// `points`: the whole cloud, or a thinned one of the size that the settings were resolved for. `part` is what samples are drawn from, and
-  /// where the settings say so what swarms search. `evaluator` is given what is searched.
-  MultiModel(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::WorkingPoints& points, const Part& part,
-             const Settings& settings, std::uint64_t seed, Limits limits);
+  /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are drawn
+  /// from, and where the settings say so what swarms search. `evaluator` is given what is searched. `kinds` must outlive this.
+  MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points, const Part& part,
+             std::uint64_t seed, Limits limits);
 
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle().
   Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result);
-  /// Positions of the result's models in the frame of the points.
-  const std::vector<models::Position>& found() const noexcept { return found_; }
+  /// The result's models in the frame of the points.
+  const std::vector<models::Placed>& found() const noexcept { return found_; }
+  /// Flat models that curved ones were taken for; not in the result.
+  const std::vector<models::Placed>& hidden() const noexcept { return hidden_; }
+  /// Has a model no say in what is nearer to another, be it hidden?
+  bool shares_points() const noexcept { return asked_ > 1 || !hidden_.empty(); }
   /// Labels of the points where they were shared out jointly, with an eye to their neighbours; else empty, and the nearest model owns each.
   const std::vector<std::uint16_t>& labels() const noexcept { return labels_; }
 
  private:
-  enum class Outcome { found, unpaid, complete, interrupted };
+  enum class Outcome { interrupted, unpaid, complete, flat, found };
 
-  Expected<Outcome> search(std::uint32_t round, std::span<const models::Position> seeds, models::Position& theta, double& loss);
-  /// Flies one swarm over the caps as they are; false if it ended early. Samples are of points whose cap is at least `alive`.
-  Expected<bool> fly(Swarm& swarm, std::uint32_t round, std::span<const models::Position> seeds, float alive);
-  Expected<> refine(models::Position& theta, double& loss);
-  Expected<bool> accept(const models::Position& theta, double loss, const ModelCallback& on_model, FitResult& result);
-  Expected<> deflate();
+  /// What a swarm came to.
+  struct Candidate {
+    std::size_t kind = 0;
+    models::Position theta;
+    double loss = 0;
+    std::vector<float> distances;  // of all points
+    Support support;
+  };
+  using Seeds = std::vector<std::vector<models::Position>>;  // of each kind
+
+  /// One swarm of one kind, and what it came to.
+  Expected<Outcome> explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate);
+  /// A swarm of each kind, and the best of what they came to.
+  Expected<Outcome> search(const Seeds& seeds, Candidate& best);
+  /// Flies one swarm over the evaluator's caps, which are those of `caps`; false if it ended early. Samples are of points whose cap is at
+  /// least `alive`.
+  Expected<bool> fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
+                     std::span<const float> caps, float alive);
+  Expected<> refine(Candidate& candidate);
+  Expected<bool> accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result);
+  Expected<> deflate(const Candidate& candidate);
   Expected<> finish(FitResult& result);
   Expected<> polish();
   Expected<> share_out(FitResult& result);
@@ -61,35 +82,55 @@ class MultiModel {
   Expected<> drop_unpaid(FitResult& result);
   std::optional<std::string> interrupted() const;
   void restore_caps();
-  Expected<> show_caps();
+  Expected<> show(std::span<const float> caps);
   void count_effort(FitResult& result) const;
   double elapsed_ms() const;
-  double loss_of_nothing() const;
+  double loss_of_nothing(std::span<const float> caps) const;
   bool shares_out() const noexcept;
   int full_rounds() const noexcept;  ///< of refinement on all points
   const Ground& searched() const noexcept { return part_searched_ ? part_ground_ : ground_; }
+  const models::ModelSpace& space(std::size_t kind) const noexcept { return *kinds_[kind].space; }
+  Ground whole(std::size_t kind) const noexcept { return ground_.of(space(kind)); }
+
+  // Between kinds; in contest.cpp.
+  double worth(const Candidate& candidate) const;
+  double worth(double saved, int freedom) const;
+  /// Share of a model's points whose surface lies along it; 1 where normals are not known.
+  double agreement(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
+  /// Sum over points of what a model saves, as far as they lie along it [data unit].
+  double saving(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
+  std::size_t flat_kind(std::size_t curved) const noexcept;
+  /// The winner must stand against the other kinds on its own points.
+  Expected<Outcome> contest(Candidate& winner);
+  Expected<bool> challenge(const Candidate& winner, Candidate& challenger);
+  Expected<bool> best_on(std::size_t kind, std::span<const float> caps, models::Position& theta, std::vector<float>& distances);
+  Expected<bool> bends(const Candidate& winner, models::Position& flat);
+  /// Where nothing curved pays: is a hidden flat model in the way?
+  Expected<Outcome> look_flat(Candidate& best, Outcome otherwise);
+  Expected<Outcome> flatten(Candidate& winner, models::Position flat);
 
   kernels::FitnessEvaluator& evaluator_;
-  const models::ModelSpace& space_;
+  std::span<const Kind> kinds_;
+  std::size_t asked_ = 0;  // the first so many of them; the rest are hidden
   const models::WorkingPoints& points_;
-  const Settings& settings_;
+  const Settings& settings_;  // of the first kind; for what all kinds share
   Random random_;
   Limits limits_;
   const Subset& part_;
   const models::Neighbours& neighbours_;
+  const models::Neighbours none_;
   const bool part_searched_;
-  Landscape landscape_;  // of the points that are searched
+  std::vector<Landscape> landscapes_;  // of the points that are searched, one a kind
   float tau_;
-  Ground ground_, part_ground_;                      // all points, and the part
-  std::vector<float> caps_, part_caps_, distances_;  // one a point; caps are what is left to explain, in both kinds of deflation
-  std::vector<float> nearest_;                       // one a point: how far the nearest found model is; empty until there is one
-  Support support_;                                  // of the last candidate
-  std::vector<models::Position> found_;
+  Ground ground_, part_ground_;          // all points, and the part; as the first kind has it
+  std::vector<float> caps_, part_caps_;  // one a point; what is left to explain, in both kinds of deflation. The part's as shown last
+  std::vector<float> nearest_;           // one a point: how far the nearest found model is; empty until there is one
+  std::vector<models::Placed> found_, hidden_;
   std::vector<models::Position> proposals_;  // what the joint end may add to them
   std::vector<std::uint16_t> labels_;
-  double scale_ = 0;  // loss of a model that explains nothing
-  std::size_t steps_ = 0;
-  std::uint32_t round_ = 0;  // swarms flown so far
+  double scale_ = 0;                        // loss of a model that explains nothing
+  std::size_t steps_ = 0;                   // of this round's swarms
+  std::uint32_t round_ = 0, contests_ = 0;  // swarms flown so far
   std::string stop_reason_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/refinement.hpp"
 
@@ -50,11 +51,11 @@ namespace {
 
 /// Sigma as the models see it that the points within `tau` of them show: the weighted median, each model voting with what it holds. 0 without
 /// models.
-Expected<double> common_sigma(const Ground& ground, std::span<const models::Position> models, std::vector<float>& distances) {
+Expected<double> common_sigma(const Ground& ground, std::span<const models::Placed> models, std::vector<float>& distances) {
   std::vector<std::pair<double, std::size_t>> votes;
   std::size_t total = 0;
-  for (const models::Position& theta : models) {
-    const auto evidence = weigh(ground, theta, {}, distances);
+  for (const auto& [space, theta] : models) {
+    const auto evidence = weigh(ground.of(*space), theta, {}, distances);
     if (!evidence) return tl::unexpected(evidence.error());
     const auto tau = static_cast<double>(ground.tau);
     votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), static_cast<std::size_t>(evidence->count));
@@ -73,20 +74,21 @@ bool near(double a, double b) { return std::abs(a - b) <= kSettled * b; }
 
 }  // namespace
 
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
-                                    const models::WorkingPoints& points, const Part& part, std::size_t finite_points,
-                                    const FitOptions& options) {
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
+                                    std::size_t finite_points, const FitOptions& options) {
+  std::vector<Kind> kinds = make_kinds(options);
   const double unit = points.frame().scale;
   double tau = kGenerous * unit;
   std::vector<float> distances(points.size()), caps(points.size());
   for (int round = 0; round < kRounds; ++round) {
-    const Settings settings = resolve(options, finite_points, tau);
+    resolve(kinds, options, finite_points, tau);
+    const Settings& settings = kinds.front().settings;
     Limits limits;
     limits.max_models = kModels;
-    MultiModel search(evaluator, space, points, part, settings, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
+    MultiModel search(evaluator, kinds, points, part, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
-    std::vector<models::Position> found = search.found();
+    std::vector<models::Placed> found = search.found();
     if (found.empty()) {  // so wide that nothing stands out from what surrounds it
       tau /= 2;
       continue;
@@ -94,11 +96,11 @@ Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const 
     // The models follow the threshold and it follows them, without a search each time; the next search starts where they have come to.
     const double searched = tau;
     for (int step = 0; step < kSteps; ++step) {
-      const Ground ground{evaluator, space, points, static_cast<float>(tau)};
+      const Ground ground{evaluator, *kinds.front().space, points, static_cast<float>(tau)};
       if (step > 0) {
         for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = points.finite(i) ? ground.tau : 0.0F;
-        for (models::Position& theta : found) {
-          if (auto done = refine_one(ground, settings.loss, caps, theta); !done) return tl::unexpected(done.error());
+        for (auto& [space, theta] : found) {
+          if (auto done = refine_one(ground.of(*space), settings.loss, caps, theta); !done) return tl::unexpected(done.error());
         }
       }
       const auto sigma = common_sigma(ground, found, distances);

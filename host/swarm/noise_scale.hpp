@@ -16,8 +16,7 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
 /// tau = 2.5 sigma, sigma the noise of the most prominent models: a swarm finds one under a generous threshold, the spread of its
 /// inliers gives the next threshold, until that stays. `points` stand for a whole cloud of `finite_points`; `part` of them as MultiModel
 /// takes it. Fails with bad_input where the data show no scale.
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space,
-                                    const models::WorkingPoints& points, const Part& part, std::size_t finite_points,
-                                    const FitOptions& options);
+Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
+                                    std::size_t finite_points, const FitOptions& options);
 
 }  // namespace swarmfit::swarm

@@ -23,10 +23,10 @@ double loss_of(const kernels::Evidence& evidence, Loss loss, std::span<const flo
 }
 
 /// Sum over points of the distance to the nearest model, at most tau.
-Expected<double> joint_energy(const Ground& ground, const std::vector<models::Position>& models) {
+Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models) {
   std::vector<float> distances(ground.size()), least(ground.size(), ground.tau);
-  for (const models::Position& model : models) {
-    if (auto done = weigh(ground, model, {}, distances); !done) return tl::unexpected(done.error());
+  for (const models::Placed& model : models) {
+    if (auto done = weigh(ground.of(*model.space), model.theta, {}, distances); !done) return tl::unexpected(done.error());
     for (std::size_t i = 0; i < distances.size(); ++i) {
       if (distances[i] < least[i]) least[i] = distances[i];
     }
@@ -97,16 +97,34 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
   return best;
 }
 
-Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models, int rounds) {
-  std::vector<float> distances(needs_distances(ground, Loss::truncated_l1) ? ground.size() : 0);
+Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models) {
+  std::vector<std::vector<float>> all(models.size(), std::vector<float>(ground.size()));
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    if (auto done = weigh(ground.of(*models[m].space), models[m].theta, {}, all[m]); !done) return tl::unexpected(done.error());
+  }
+  return all;
+}
+
+void left_by_others(const std::vector<std::vector<float>>& distances, std::size_t model, float tau, std::vector<float>& caps) {
+  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = std::isnan(distances[model][i]) ? 0.0F : tau;
+  for (std::size_t m = 0; m < distances.size(); ++m) {
+    if (m == model) continue;
+    for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = distances[m][i] < caps[i] ? distances[m][i] : caps[i];
+  }
+}
+
+Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds) {
+  std::vector<float> distances;
   auto energy = joint_energy(ground, models);
   if (!energy) return energy;
   for (int round = 0; round < rounds; ++round) {
-    std::vector<models::Position> candidates = models;
+    std::vector<models::Placed> candidates = models;
     for (std::size_t m = 0; m < models.size(); ++m) {
-      auto evidence = weigh(ground, models[m], {}, distances);
+      const Ground own = ground.of(*models[m].space);
+      distances.resize(needs_distances(own, Loss::truncated_l1) ? own.size() : 0);
+      auto evidence = weigh(own, models[m].theta, {}, distances);
       if (!evidence) return tl::unexpected(evidence.error());
-      if (!refine(ground, *evidence, {}, distances, candidates[m])) candidates[m] = models[m];
+      if (!refine(own, *evidence, {}, distances, candidates[m].theta)) candidates[m] = models[m];
     }
     auto candidate_energy = joint_energy(ground, candidates);
     if (!candidate_energy) return candidate_energy;
@@ -119,12 +137,12 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Positi
   return energy;
 }
 
-Expected<std::vector<std::size_t>> unique_support(const Ground& ground, const std::vector<models::Position>& models) {
+Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
   constexpr std::uint16_t kSeveral = 65535;
   std::vector<std::uint16_t> owner(ground.size(), 0);
   std::vector<float> distances(ground.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
-    if (auto done = weigh(ground, models[m], {}, distances); !done) return tl::unexpected(done.error());
+    if (auto done = weigh(ground.of(*models[m].space), models[m].theta, {}, distances); !done) return tl::unexpected(done.error());
     const auto mine = static_cast<std::uint16_t>(m + 1);
     for (std::size_t i = 0; i < distances.size(); ++i) {
       const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;

@@ -20,6 +20,8 @@ struct Ground {
   const Subset* part = nullptr;
   float corner = 0.1F;  ///< of tau: below this a residual weighs as in least squares, so that none weighs infinitely
 
+  /// The same for a model of another kind.
+  Ground of(const models::ModelSpace& other) const noexcept { return {evaluator, other, points, tau, part, corner}; }
   std::size_t size() const noexcept { return part != nullptr ? part->index().size() : points.size(); }
   kernels::PointsView view() const noexcept { return part != nullptr ? part->view() : points.view(); }
   /// Input index of the k-th point.
@@ -44,11 +46,17 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
 Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = 8,
                             std::vector<float>* distances = nullptr);
 
+/// Distances of the ground's points to each of several models, of whatever kinds; NaN where a point is not finite.
+Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models);
+
+/// What the other models leave of each of the ground's points: tau, or the distance to the nearest of them. `distances` as by measure().
+void left_by_others(const std::vector<std::vector<float>>& distances, std::size_t model, float tau, std::vector<float>& caps);
+
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
 /// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.
-Expected<double> refine_jointly(const Ground& ground, std::vector<models::Position>& models, int rounds = 8);
+Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds = 8);
 
 /// For each model, the points within tau of it and of no other: what would be lost without it.
-Expected<std::vector<std::size_t>> unique_support(const Ground& ground, const std::vector<models::Position>& models);
+Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models);
 
 }  // namespace swarmfit::swarm

@@ -28,7 +28,39 @@ Expected<> check_prior(const DirectionPrior& prior) {
   return require(prior.max_angle > 0 && prior.max_angle <= 1.5707963267948968, "prior.max_angle", prior.max_angle, "in (0, pi/2] rad");
 }
 
+/// What each of several kinds must be to compete for the same points.
+Expected<> check_rivals(const FitOptions& options) {
+  const auto refuse = [](ModelType rival, const std::string& bound) {
+    return fail(Error::Kind::invalid_option, fmt::format("rivals holds {}, must hold {}", name(rival), bound));
+  };
+  for (std::size_t r = 0; r < options.rivals.size(); ++r) {
+    const ModelType rival = options.rivals[r];
+    const auto columns = dimension(options.model);
+    if (dimension(rival) != columns) {
+      return refuse(rival, fmt::format("only kinds of {} columns, as {} has; it has {}", columns, name(options.model), dimension(rival)));
+    }
+    if (columns > 3)
+      return refuse(rival, fmt::format("nothing beside {}: of point pairs one kind is fitted at a time", name(options.model)));
+    const auto before = options.rivals.begin() + static_cast<std::ptrdiff_t>(r);
+    if (rival == options.model || std::find(options.rivals.begin(), before, rival) != before) return refuse(rival, "each kind once");
+  }
+  if (options.rivals.empty()) return {};
+  if (options.deflation.value_or(options.preset == Preset::paper ? Deflation::parametric : Deflation::residual) == Deflation::parametric) {
+    return fail(Error::Kind::invalid_option,
+                fmt::format("deflation is parametric with {} kinds, must be residual (preset fast)", options.kinds().size()));
+  }
+  return {};
+}
+
+bool has_direction(ModelType type) { return type == ModelType::line2d || type == ModelType::plane || type == ModelType::cylinder; }
+
 }  // namespace
+
+std::vector<ModelType> FitOptions::kinds() const {
+  std::vector<ModelType> all{model};
+  all.insert(all.end(), rivals.begin(), rivals.end());
+  return all;
+}
 
 Expected<> FitOptions::validate() const {
   Expected<> checks[] = {
@@ -45,8 +77,10 @@ Expected<> FitOptions::validate() const {
   for (Expected<>& check : checks) {
     if (!check) return std::move(check);
   }
+  if (auto ok = check_rivals(*this); !ok) return ok;
   if (!prior) return {};
-  if (model != ModelType::line2d && model != ModelType::plane && model != ModelType::cylinder) {
+  const std::vector<ModelType> all = kinds();
+  if (std::none_of(all.begin(), all.end(), has_direction)) {
     return fail(Error::Kind::invalid_option, fmt::format("prior is given for a {}, must be for a line2d, plane or cylinder", name(model)));
   }
   return check_prior(*prior);

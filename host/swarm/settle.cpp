@@ -9,12 +9,12 @@ namespace {
 /// Models as kernels take them.
 class Views {
  public:
-  Views(const Ground& ground, const std::vector<models::Position>& found) {
+  Views(const Ground& ground, const std::vector<models::Placed>& found) {
     parameters_.reserve(found.size());
-    for (const models::Position& theta : found) {
-      parameters_.push_back(ground.space.to_data(theta, ground.points.frame()));
+    for (const auto& [space, theta] : found) {
+      parameters_.push_back(space->to_data(theta, ground.points.frame()));
       const models::Position& row = parameters_.back();
-      views_.push_back({ground.space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
+      views_.push_back({space->kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
     }
   }
   std::span<const kernels::ModelView> views() const noexcept { return views_; }
@@ -63,30 +63,53 @@ Eigen::MatrixXd covariance(const Ground& whole, const kernels::Evidence& evidenc
   return whole.space.noise_variance(whole.points, support, theta, squares) * whole.space.unit_covariance(whole.points, support, theta);
 }
 
-}  // namespace
-
-Expected<> refit(const Ground& whole, std::vector<models::Position>& found) {
-  std::vector<float> distances(whole.space.closed_form() ? 0 : whole.size());
-  if (!distances.empty()) {
-    for (models::Position& theta : found) {
-      const auto evidence = weigh(whole, theta, {}, distances);
-      if (!evidence) return tl::unexpected(evidence.error());
-      models::Position candidate = theta;
-      if (refine(whole, *evidence, {}, distances, candidate)) theta = candidate;
-    }
-    return {};
-  }
-  const Views models(whole, found);
-  auto evidence = weigh_all(whole, models.views());
-  if (!evidence) return tl::unexpected(evidence.error());
+/// refit() of models that have no say in each other's points.
+Expected<> refit_apart(const Ground& whole, std::vector<models::Placed>& found, std::span<const models::Placed> hidden) {
+  std::vector<models::Placed> all = found;
+  all.insert(all.end(), hidden.begin(), hidden.end());
+  const auto distances = measure(whole, all);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<float> caps(whole.size()), own_distances(whole.size());
   for (std::size_t m = 0; m < found.size(); ++m) {
-    models::Position candidate = found[m];
-    if (refine(whole, (*evidence)[m], {}, {}, candidate)) found[m] = candidate;
+    left_by_others(*distances, m, whole.tau, caps);
+    const Ground own = whole.of(*found[m].space);
+    const auto evidence = weigh(own, found[m].theta, caps, own_distances);
+    if (!evidence) return tl::unexpected(evidence.error());
+    models::Position candidate = found[m].theta;
+    if (refine(own, *evidence, caps, own_distances, candidate)) found[m].theta = candidate;
   }
   return {};
 }
 
-Expected<> settle(const Ground& whole, const std::vector<models::Position>& found, FitResult& result) {
+}  // namespace
+
+Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool shared, std::span<const models::Placed> hidden) {
+  if (shared) return refit_apart(whole, found, hidden);
+  std::vector<kernels::Evidence> evidence;
+  if (std::all_of(found.begin(), found.end(), [](const models::Placed& model) { return model.space->closed_form(); })) {
+    const Views models(whole, found);
+    auto all = weigh_all(whole, models.views());
+    if (!all) return tl::unexpected(all.error());
+    evidence = std::move(*all);
+  }
+  std::vector<float> distances(evidence.empty() ? whole.size() : 0);
+  for (std::size_t m = 0; m < found.size(); ++m) {
+    const Ground own = whole.of(*found[m].space);
+    kernels::Evidence known;
+    if (evidence.empty()) {
+      const auto weighed = weigh(own, found[m].theta, {}, distances);
+      if (!weighed) return tl::unexpected(weighed.error());
+      known = *weighed;
+    } else {
+      known = evidence[m];
+    }
+    models::Position candidate = found[m].theta;
+    if (refine(own, known, {}, distances, candidate)) found[m].theta = candidate;
+  }
+  return {};
+}
+
+Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, FitResult& result) {
   const models::Frame& frame = whole.points.frame();
   const Views models(whole, found);
   std::vector<kernels::Evidence> evidence(found.size());
@@ -104,7 +127,9 @@ Expected<> settle(const Ground& whole, const std::vector<models::Position>& foun
     model.parameters = models.parameters(m);
     model.inliers = evidence[m].count;
     model.rms = n > 0 ? std::sqrt(evidence[m].square / n) : 0.0;
-    model.covariance = whole.space.covariance_to_data(covariance(whole, evidence[m], result.labels, m + 1, found[m]), found[m], frame);
+    const auto& [space, theta] = found[m];
+    model.type = space->type();
+    model.covariance = space->covariance_to_data(covariance(whole.of(*space), evidence[m], result.labels, m + 1, theta), theta, frame);
   }
   return {};
 }

@@ -139,7 +139,7 @@ void bind_models(nb::module_& module) {
     return names;
   });
   module.def(
-      "dimension", [](const std::string& type) { return dimension(value_of(model_type(type))); }, "type"_a);
+      "dimension", [](const std::string& types) { return dimension(value_of(model_types(types)).front()); }, "type"_a);
 }
 
 }  // namespace swarmfit::python

@@ -58,7 +58,9 @@ std::filesystem::path path(nb::handle value) { return nb::cast<std::filesystem::
 bool set(FitOptions& o, std::string_view name, nb::handle value) {
   const auto whole = [&](auto& field) { field = number<int>(name, value); };
   if (name == "model") {
-    o.model = value_of(model_type(text(name, value)));
+    const auto kinds = value_of(model_types(text(name, value)));
+    o.model = kinds.front();
+    o.rivals.assign(kinds.begin() + 1, kinds.end());
   } else if (name == "threshold") {
     if (nb::isinstance<nb::str>(value)) {
       if (text(name, value) != "auto") refuse(name, value, "a number > 0 or 'auto'");

@@ -90,7 +90,7 @@ _T = TypeVar("_T")
 
 _FIT_OPTIONS = """
     Options, None for the default:
-        model: plane, line2d, circle2d, sphere, cylinder, homography, fundamental.
+        model: plane, line2d, circle2d, sphere, cylinder, homography, fundamental; several, parted by commas, compete for the same points.
         threshold: inliers are within this distance, in the data's unit; "auto" takes it from the data's own noise.
             Default 0.01 for planes, spheres and cylinders, 6 px for homographies, 2.5 px for fundamental matrices, else "auto".
         backend: "auto", "cpu", "vulkan", "reference", or part of a device's name; see devices().

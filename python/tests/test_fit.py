@@ -25,6 +25,13 @@ def test_finds_the_planes(corner: np.ndarray) -> None:
     assert [int((result.labels == k + 1).sum()) for k in range(3)] == [m.inliers for m in result.models]
 
 
+def test_several_kinds_compete(corner: np.ndarray) -> None:
+    result = swarmfit.fit(corner, "sphere,plane,cylinder", threshold=0.01)
+    assert [model.type for model in result.models] == ["plane"] * 3
+    with pytest.raises(ValueError, match="line2d"):
+        swarmfit.fit(corner, "plane,line2d")
+
+
 def test_stats_explain_the_result(corner: np.ndarray) -> None:
     result = swarmfit.fit(corner, threshold=0.01, backend="cpu", seed=3)
     stats = result.stats

@@ -1,4 +1,4 @@
-// Find all models of a kind in data full of outliers.
+// Find all models of a kind, or of several, in data full of outliers.
 #pragma once
 
 #include <cstdint>
@@ -37,6 +37,7 @@ struct DirectionPrior {
 
 struct FitOptions {
   ModelType model = ModelType::plane;
+  std::vector<ModelType> rivals;  ///< further kinds that compete with `model` for the same points; all of 2 or all of 3 columns, each once
   std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane, sphere, cylinder 0.01;
                                     ///< homography 6 px, fundamental 2.5 px; line2d and circle2d estimate it)
   bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
@@ -56,6 +57,8 @@ struct FitOptions {
   int threads = 0;               ///< of the CPU back end; 0 takes all
   std::string pipeline_cache;    ///< folder for compiled Vulkan pipelines; empty keeps none
 
+  /// `model` and its rivals.
+  SWARMFIT_API std::vector<ModelType> kinds() const;
   /// Fails with invalid_option, naming the field, its value and its bound.
   SWARMFIT_API Expected<> validate() const;
 };

@@ -28,6 +28,8 @@ enum class ModelType {
 SWARMFIT_API std::string_view name(ModelType type) noexcept;
 /// Fails with invalid_option, naming what there is.
 SWARMFIT_API Expected<ModelType> model_type(std::string_view name);
+/// Several kinds, their names parted by commas. Fails with invalid_option.
+SWARMFIT_API Expected<std::vector<ModelType>> model_types(std::string_view names);
 /// Every kind this build knows.
 SWARMFIT_API std::span<const ModelType> model_types() noexcept;
 /// Columns of a point the kind is fitted to.

@@ -1,0 +1,36 @@
+#include "host/swarm/kinds.hpp"
+
+#include <algorithm>
+
+namespace swarmfit::swarm {
+
+bool is_curved(ModelType type) noexcept { return type == ModelType::circle2d || type == ModelType::sphere || type == ModelType::cylinder; }
+
+ModelType flat_of(ModelType type) noexcept { return dimension(type) == 2 ? ModelType::line2d : ModelType::plane; }
+
+std::vector<Kind> make_kinds(const FitOptions& options) {
+  const std::vector<ModelType> asked = options.kinds();
+  std::vector<Kind> kinds;
+  for (const ModelType type : asked) kinds.push_back({models::make_space(type, options.prior), {}, false});
+  const ModelType flat = flat_of(options.model);
+  // A flat kind with a prior leaves out what is flat and lies otherwise.
+  const bool flat_asked = !options.prior && std::find(asked.begin(), asked.end(), flat) != asked.end();
+  const bool doubtful = options.preset == Preset::fast && options.deflation != Deflation::parametric;
+  if (doubtful && !flat_asked && std::any_of(asked.begin(), asked.end(), is_curved)) {
+    kinds.push_back({models::make_space(flat, {}), {}, true});
+  }
+  return kinds;
+}
+
+void resolve(std::vector<Kind>& kinds, const FitOptions& options, std::size_t finite_points, double threshold) {
+  FitOptions one = options;
+  int patience = 0;
+  for (Kind& kind : kinds) {
+    one.model = kind.space->type();
+    kind.settings = resolve(one, finite_points, threshold);
+    if (!kind.hidden) patience = std::max(patience, kind.settings.patience);
+  }
+  for (Kind& kind : kinds) kind.settings.patience = patience;
+}
+
+}  // namespace swarmfit::swarm

@@ -1,0 +1,31 @@
+// The kinds of model that a fit looks for.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <swarmfit/fit.hpp>
+
+#include "host/models/model_space.hpp"
+#include "host/swarm/settings.hpp"
+
+namespace swarmfit::swarm {
+
+struct Kind {
+  std::unique_ptr<const models::ModelSpace> space;
+  Settings settings;    ///< once resolved
+  bool hidden = false;  ///< not asked for; it only takes what is flat from the curved ones
+};
+
+/// Those asked for, in that order, and behind them the flat one that curved kinds are held against, where that was not asked for.
+std::vector<Kind> make_kinds(const FitOptions& options);
+/// Fills their settings in; as resolve() of one.
+void resolve(std::vector<Kind>& kinds, const FitOptions& options, std::size_t finite_points, double threshold);
+
+/// A circle, a sphere or a cylinder: with a large radius it is a line or a plane for all that the data can tell.
+bool is_curved(ModelType type) noexcept;
+/// What it is then.
+ModelType flat_of(ModelType type) noexcept;
+
+}  // namespace swarmfit::swarm

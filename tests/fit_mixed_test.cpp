@@ -1,0 +1,274 @@
+// Several kinds in one call compete for the same points, and what is flat is not taken for something curved.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+#include <swarmfit/fit.hpp>
+
+namespace swarmfit {
+namespace {
+
+using Vector = Eigen::Vector3d;
+
+constexpr double kRadius[] = {0.04, 0.07, 0.06, 0.09};  // of two cylinders and two spheres [m]
+constexpr double kNoise = 0.002;                        // sigma, along the normal [m]
+
+/// A table and what stands on it, seen from all sides, with uniform outliers. Labels: 0 outlier, 1 table, then as kRadius.
+class Scene {
+ public:
+  explicit Scene(std::uint64_t seed) : engine_(seed) {}
+
+  void table(std::size_t count, std::uint16_t label = 1) {
+    for (std::size_t i = 0; i < count; ++i) add(Vector(uniform(-0.6, 0.6), uniform(-0.4, 0.4), noise()), label);
+  }
+  void cylinder(const Vector& foot, double radius, double height, std::size_t count, std::uint16_t label) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double turn = uniform(0, 2 * std::numbers::pi), r = radius + noise();
+      add(foot + Vector(r * std::cos(turn), r * std::sin(turn), uniform(0, height)), label);
+    }
+  }
+  void sphere(const Vector& centre, double radius, std::size_t count, std::uint16_t label) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), flat = std::sqrt(1 - z * z);
+      add(centre + (radius + noise()) * Vector(flat * std::cos(turn), flat * std::sin(turn), z), label);
+    }
+  }
+  void outliers(std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) add(Vector(uniform(-0.6, 0.6), uniform(-0.4, 0.4), uniform(-0.1, 0.5)), 0);
+  }
+  double uniform(double low, double high) { return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53; }
+
+  PointsView points() const { return {std::span<const double>(rows_), 3}; }
+  const std::vector<std::uint16_t>& truth() const { return truth_; }
+
+ private:
+  /// Nearly normal, the same with every standard library.
+  double noise() {
+    double sum = 0;
+    for (int k = 0; k < 12; ++k) sum += uniform(-0.5, 0.5);
+    return kNoise * sum;
+  }
+  void add(const Vector& p, std::uint16_t label) {
+    rows_.insert(rows_.end(), p.begin(), p.end());
+    truth_.push_back(label);
+  }
+
+  std::mt19937_64 engine_;
+  std::vector<double> rows_;
+  std::vector<std::uint16_t> truth_;
+};
+
+Scene table_scene(std::uint64_t seed) {
+  Scene scene(seed);
+  scene.table(9000);
+  scene.cylinder(Vector(-0.3, 0.15, 0.01), kRadius[0], 0.2, 2500, 2);
+  scene.cylinder(Vector(0.3, 0.2, 0.01), kRadius[1], 0.15, 3000, 3);
+  scene.sphere(Vector(-0.1, -0.2, 0.07), kRadius[2], 2000, 4);
+  scene.sphere(Vector(0.25, -0.15, 0.1), kRadius[3], 3500, 5);
+  scene.outliers(2000);
+  return scene;
+}
+
+FitOptions options_for(std::vector<ModelType> kinds, std::uint64_t seed = 1) {
+  FitOptions options;
+  options.model = kinds.front();
+  options.rivals.assign(kinds.begin() + 1, kinds.end());
+  options.backend = "cpu";
+  options.seed = seed;
+  return options;
+}
+
+const std::vector<ModelType> kAll{ModelType::plane, ModelType::cylinder, ModelType::sphere};
+
+double radius(const Model& model) { return model.parameters[model.parameters.size() - 1]; }
+
+std::string told(const FitResult& result) {
+  std::string all;
+  for (const Model& m : result.models)
+    all += std::string(name(m.type)) + " " + std::to_string(radius(m)) + " " + std::to_string(m.inliers) + "; ";
+  return all;
+}
+
+std::vector<double> radii(const FitResult& result, ModelType type) {
+  std::vector<double> found;
+  for (const Model& model : result.models) {
+    if (model.type == type) found.push_back(radius(model));
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+void expect_radii(const FitResult& result, ModelType type, std::span<const double> truth) {
+  const auto found = radii(result, type);
+  ASSERT_EQ(found.size(), truth.size()) << told(result);
+  for (std::size_t k = 0; k < truth.size(); ++k) EXPECT_NEAR(found[k], truth[k], 0.05 * truth[k]) << told(result);
+}
+
+/// What is found may be wrong about things of a kind that was not asked for, but it is not made of the table.
+void expect_not_the_table(const Scene& scene, const FitResult& result) {
+  std::vector<std::size_t> table(result.models.size() + 1, 0);
+  for (std::size_t i = 0; i < scene.truth().size(); ++i) table[result.labels[i]] += scene.truth()[i] == 1 ? 1U : 0U;
+  for (std::size_t m = 0; m < result.models.size(); ++m) {
+    EXPECT_LT(2 * table[m + 1], result.models[m].inliers) << "model " << m << " of " << told(result);
+  }
+}
+
+class FitMixed : public testing::TestWithParam<int> {};
+
+TEST_P(FitMixed, EachThingIsFoundAsWhatItIs) {
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  const Scene scene = table_scene(seed);
+  const auto result = fit(scene.points(), options_for(kAll, seed));
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(radii(*result, ModelType::plane).size(), 1U) << told(*result);
+  expect_radii(*result, ModelType::cylinder, std::span(kRadius).first(2));
+  expect_radii(*result, ModelType::sphere, std::span(kRadius).last(2));
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < scene.truth().size(); ++i) {
+    const std::uint16_t label = result->labels[i], truth = scene.truth()[i];
+    if (truth == 0) continue;
+    const ModelType type = truth == 1 ? ModelType::plane : truth < 4 ? ModelType::cylinder : ModelType::sphere;
+    if (label == 0 || result->models[label - 1U].type != type) ++wrong;
+  }
+  EXPECT_LT(wrong, scene.truth().size() / 20);
+  for (const Model& model : result->models) {
+    EXPECT_TRUE(model.covariance.allFinite());
+    EXPECT_EQ(model.covariance.rows(), model.parameters.size());
+    EXPECT_GT(model.inliers, 0U);
+  }
+}
+
+TEST_P(FitMixed, OrderOfKindsIsNoMatter) {
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  const Scene scene = table_scene(seed + 100);
+  const auto result = fit(scene.points(), options_for({ModelType::sphere, ModelType::plane, ModelType::cylinder}, seed));
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(radii(*result, ModelType::plane).size(), 1U) << told(*result);
+  expect_radii(*result, ModelType::cylinder, std::span(kRadius).first(2));
+  expect_radii(*result, ModelType::sphere, std::span(kRadius).last(2));
+}
+
+TEST_P(FitMixed, WhatIsAskedForAloneIsNotFoundInTheTable) {
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  const Scene scene = table_scene(seed + 200);
+  const auto spheres = fit(scene.points(), options_for({ModelType::sphere}, seed));
+  ASSERT_TRUE(spheres) << spheres.error().message;
+  for (const double r : {kRadius[2], kRadius[3]}) {
+    const auto found = radii(*spheres, ModelType::sphere);
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), [&](double f) { return std::abs(f - r) < 0.05 * r; })) << told(*spheres);
+  }
+  expect_not_the_table(scene, *spheres);
+  const auto cylinders = fit(scene.points(), options_for({ModelType::cylinder}, seed));
+  ASSERT_TRUE(cylinders) << cylinders.error().message;
+  for (const double r : {kRadius[0], kRadius[1]}) {
+    const auto found = radii(*cylinders, ModelType::cylinder);
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), [&](double f) { return std::abs(f - r) < 0.05 * r; })) << told(*cylinders);
+  }
+  expect_not_the_table(scene, *cylinders);
+}
+
+TEST_P(FitMixed, PlanesAloneGiveNothingCurved) {
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  Scene scene(seed + 300);
+  scene.table(6000);
+  scene.outliers(1500);
+  for (const std::vector<ModelType>& kinds : {std::vector{ModelType::cylinder}, std::vector{ModelType::sphere}, kAll}) {
+    const auto result = fit(scene.points(), options_for(kinds, seed));
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_EQ(result->models.size(), kinds.size() > 1 ? 1U : 0U) << told(*result);
+    for (const Model& model : result->models) EXPECT_EQ(model.type, ModelType::plane) << told(*result);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, FitMixed, testing::Range(1, 6));
+
+TEST(FitMixedOnce, SameAnswerOnOneThreadAndTwo) {
+  const Scene scene = table_scene(7);
+  FitOptions options = options_for(kAll, 3);
+  options.threads = 1;
+  const auto one = fit(scene.points(), options);
+  options.threads = 2;
+  const auto two = fit(scene.points(), options), again = fit(scene.points(), options);
+  ASSERT_TRUE(one && two && again);
+  EXPECT_EQ(one->labels, two->labels);
+  EXPECT_EQ(again->labels, two->labels);
+  ASSERT_EQ(one->models.size(), two->models.size());
+  for (std::size_t m = 0; m < one->models.size(); ++m) {
+    EXPECT_EQ(one->models[m].type, two->models[m].type);
+    EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
+    EXPECT_EQ(one->models[m].evaluations, two->models[m].evaluations);
+  }
+}
+
+TEST(FitMixedOnce, LinesAndCircles) {
+  std::mt19937_64 engine(3);
+  const auto uniform = [&](double low, double high) { return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53; };
+  std::vector<double> rows;
+  const auto near = [&](double x, double y) { rows.insert(rows.end(), {x + uniform(-0.004, 0.004), y + uniform(-0.004, 0.004)}); };
+  for (int i = 0; i < 200; ++i) {
+    const double t = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi);
+    near(t, 0.3 * t - 0.5);
+    near(-0.3 + 0.4 * std::cos(turn), 0.3 + 0.4 * std::sin(turn));
+    rows.insert(rows.end(), {uniform(-1, 1), uniform(-1, 1)});
+  }
+  FitOptions options = options_for({ModelType::line2d, ModelType::circle2d});
+  for (const bool estimated : {false, true}) {
+    options.threshold = estimated ? std::nullopt : std::optional(0.01);
+    const auto result = fit(PointsView(std::span<const double>(rows), 2), options);
+    ASSERT_TRUE(result) << result.error().message;
+    ASSERT_EQ(result->models.size(), 2U) << told(*result);
+    EXPECT_NE(result->models[0].type, result->models[1].type) << told(*result);
+    const auto circles = radii(*result, ModelType::circle2d);
+    ASSERT_EQ(circles.size(), 1U);
+    EXPECT_NEAR(circles[0], 0.4, 0.02);
+  }
+}
+
+TEST(FitMixedOnce, CoplanarPointsStillGiveAPlane) {
+  std::vector<double> rows;
+  for (int i = 0; i < 400; ++i) rows.insert(rows.end(), {(i % 20) * 0.05, (i / 20) * 0.05, 0.0});
+  const auto result = fit(PointsView(std::span<const double>(rows), 3), options_for(kAll));
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_EQ(result->models.size(), 1U) << told(*result);
+  EXPECT_EQ(result->models[0].type, ModelType::plane);
+}
+
+TEST(FitMixedOnce, WarmStartGoesToItsOwnKind) {
+  const Scene scene = table_scene(11);
+  auto fitter = Fitter::create(options_for(kAll));
+  ASSERT_TRUE(fitter);
+  const auto first = fitter->fit(scene.points());
+  ASSERT_TRUE(first);
+  const auto second = fitter->fit(scene.points(), {}, {}, first->models);
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_EQ(second->models.size(), first->models.size()) << told(*second);
+}
+
+TEST(FitMixedOnce, OptionsThatCannotBeAreNamed) {
+  const auto refused = [](const FitOptions& options, std::initializer_list<const char*> words) {
+    const auto ok = options.validate();
+    ASSERT_FALSE(ok);
+    EXPECT_EQ(ok.error().kind, Error::Kind::invalid_option);
+    for (const char* word : words) EXPECT_NE(ok.error().message.find(word), std::string::npos) << ok.error().message;
+  };
+  refused(options_for({ModelType::plane, ModelType::line2d}), {"rivals", "line2d", "3", "2"});
+  refused(options_for({ModelType::plane, ModelType::sphere, ModelType::sphere}), {"rivals", "sphere", "once"});
+  refused(options_for({ModelType::plane, ModelType::plane}), {"rivals", "plane", "once"});
+  refused(options_for({ModelType::homography, ModelType::fundamental}), {"rivals", "fundamental"});
+  FitOptions paper = options_for(kAll);
+  paper.preset = Preset::paper;
+  refused(paper, {"deflation", "parametric", "residual"});
+  EXPECT_EQ(model_types("plane,sphere")->size(), 2U);
+  EXPECT_FALSE(model_types("plane,"));
+  EXPECT_FALSE(model_types("plane,blob"));
+}
+
+}  // namespace
+}  // namespace swarmfit
