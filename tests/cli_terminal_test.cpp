@@ -139,7 +139,9 @@ TEST(CliTerminal, VerboseTellsOnStderrAndAPipeGetsNoColours) {
   for (const auto& text : {outcome.err, plain.out, plain.err, wrong.err}) EXPECT_EQ(text.find('\033'), std::string::npos) << text;
   std::istringstream lines(plain.out);
   for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("  ")) EXPECT_LE(line.size(), 80U) << line;
+    if (line.starts_with("  ")) {
+      EXPECT_LE(line.size(), 80U) << line;
+    }
   }
 }
 
