@@ -9,8 +9,6 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr std::uint32_t kFirstContest = 1U << 31;  // rounds of contests, apart from those of the search
-constexpr float kUnexplained = 0.5F;               // of tau: points whose cap is at least that are sampled from
-constexpr int kRounds = 8;                         // of refinement
 constexpr double kAlong = 0.8;                     // cosine of the angle between a point's normal and the model's
 constexpr double kClearly = 1.1;                   // times what a flat model is worth: a curved one must be worth more
 
@@ -49,9 +47,7 @@ double MultiModel::agreement(std::size_t kind, const models::Position& theta, st
 
 double MultiModel::saving(std::size_t kind, const models::Position& theta, std::span<const float> caps,
                           std::span<const float> distances) const {
-  double sum = 0;
-  for (std::size_t i = 0; i < caps.size(); ++i) sum += distances[i] < caps[i] ? static_cast<double>(caps[i] - distances[i]) : 0.0;
-  return sum * agreement(kind, theta, caps, distances);
+  return saved(caps, distances) * agreement(kind, theta, caps, distances);
 }
 
 std::size_t MultiModel::flat_kind(std::size_t curved) const noexcept {
@@ -87,7 +83,7 @@ Expected<bool> MultiModel::best_on(std::size_t kind, std::span<const float> caps
   auto flown = fly(swarm, kind, kFirstContest + contests_++, {}, caps, kUnexplained * tau_);
   if (flown && *flown) {
     theta = swarm.best();
-    if (auto done = refine_one(whole(kind), settings_.loss, caps, theta, kRounds, &distances); !done) {
+    if (auto done = refine_one(whole(kind), settings_.loss, caps, theta, kMostRounds, &distances); !done) {
       return tl::unexpected(done.error());
     }
   }
@@ -109,17 +105,17 @@ Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat
   const std::size_t kind = flat_kind(winner.kind);
   std::vector<float> caps = own_caps(caps_, winner.distances), distances(caps.size());
   const double own = worth(saving(winner.kind, winner.theta, caps, winner.distances), space(winner.kind).freedom());
-  double saved = 0;
+  double together = 0;
   for (int flats = 1; flats <= kFlats; ++flats) {
     models::Position theta;
     auto there = best_on(kind, caps, theta, distances);
     if (!there) return there;
     if (!*there) return true;
     if (flats == 1) flat = theta;
-    saved += saving(kind, theta, caps, distances);
-    const double theirs = worth(saved, flats * space(kind).freedom());
+    together += saving(kind, theta, caps, distances);
+    const double theirs = worth(together, flats * space(kind).freedom());
     if (own <= kClearly * theirs) return false;
-    for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = distances[i] < caps[i] ? distances[i] : caps[i];
+    take_nearer(distances, caps);
   }
   return true;
 }

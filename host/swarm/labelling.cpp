@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host/common/graph_cut.hpp"
+#include "host/swarm/payment.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -39,18 +40,12 @@ Labelling::Labelling(const Ground& ground, const Subset& part, const models::Nei
 }
 
 Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const models::Position> models) const {
-  std::vector<models::Position> parameters;
-  std::vector<kernels::ModelView> views;
-  parameters.reserve(models.size());
-  for (const models::Position& theta : models) {
-    parameters.push_back(ground_.space.to_data(theta, ground_.points.frame()));
-    const models::Position& row = parameters.back();
-    views.push_back({ground_.space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
-  }
+  ModelRows rows(ground_.points.frame(), models.size());
+  for (const models::Position& theta : models) rows.add(ground_.space, theta);
   const std::size_t points = part_.index().size();
   std::vector<float> all(points * models.size());
   std::vector<kernels::Evidence> evidence(models.size());
-  if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, views, all, evidence); !done) {
+  if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), all, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
   std::vector<std::vector<float>> distances(models.size());
@@ -167,7 +162,8 @@ double Labelling::cost(std::size_t point) const {
 }
 
 void Labelling::costs(std::span<float> costs) const {
-  for (std::size_t i = 0; i < part_.index().size(); ++i) costs[part_.index()[i]] = static_cast<float>(std::min(1.0, cost(i)));
+  std::fill(costs.begin(), costs.end(), 0.0F);
+  for (std::size_t i = 0; i < part_.index().size(); ++i) costs[part_.index()[i]] = static_cast<float>(std::min(1.0, cost(i))) * ground_.tau;
 }
 
 Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<const float> distances) {
@@ -195,9 +191,7 @@ Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
     double most = kPromising * prices_.model;
     for (std::size_t p = 0; p < proposals.size(); ++p) {
       if (open[p] == 0) continue;
-      double gain = 0;
-      for (std::size_t i = 0; i < now.size(); ++i) gain += distances[p][i] < now[i] ? static_cast<double>(now[i] - distances[p][i]) : 0.0;
-      gain /= static_cast<double>(ground_.tau);
+      const double gain = saved(now, distances[p]) / static_cast<double>(ground_.tau);
       if (gain < kPromising * prices_.model) open[p] = 0;
       if (gain > most) {
         most = gain;

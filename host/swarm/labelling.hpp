@@ -36,7 +36,7 @@ class Labelling {
   Expected<> drop();
 
   const std::vector<models::Position>& models() const noexcept { return state_.models; }
-  /// What each point of the cloud costs as things stand, in units of tau: 1 where no model owns it. Others keep their value.
+  /// What each point of the cloud costs as things stand, at most tau [data unit]; tau where no model owns it, 0 where it is not finite.
   void costs(std::span<float> costs) const;
   /// For each model its place in the list given to start, or kJoined for a proposal.
   static constexpr std::size_t kJoined = static_cast<std::size_t>(-1);

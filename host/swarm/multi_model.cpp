@@ -13,9 +13,7 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kStable = 0.01;      // spread of the list of global bests, as a share of the scale, below which it is stable
-constexpr float kUnexplained = 0.5F;  // of tau: points whose cap is at least that are sampled from
-constexpr int kMostRounds = 8;        // of refinement
+constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
 constexpr float kSharper[] = {0.03F, 0.01F, 0.003F};  // corners, one after another, where points are few
 constexpr int kFullRounds = 1;                        // of refinement on all points, where it was done on a part of them before
 
@@ -216,7 +214,7 @@ Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallbac
 Expected<> MultiModel::deflate(const Candidate& candidate) {
   const std::vector<float>& distances = candidate.distances;
   nearest_.resize(distances.size(), std::numeric_limits<float>::infinity());
-  for (std::size_t i = 0; i < nearest_.size(); ++i) nearest_[i] = distances[i] < nearest_[i] ? distances[i] : nearest_[i];
+  take_nearer(distances, nearest_);
   swarm::deflate(distances, tau_, tail_reach(candidate.support), settings_.dead_zone_slope, caps_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   return show(caps_);
@@ -231,11 +229,14 @@ Expected<> MultiModel::finish(FitResult& result) {
       if (auto energy = refine_jointly(ground_, found_); !energy) return tl::unexpected(energy.error());
     }
     if (auto done = drop_unpaid(result); !done) return done;
-    for (std::size_t m = 0; m < found_.size(); ++m)
-      result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
+    tell_parameters(result);
   }
   count_effort(result);
   return {};
+}
+
+void MultiModel::tell_parameters(FitResult& result) const {
+  for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
 }
 
 bool MultiModel::shares_out() const noexcept { return settings_.joint && !part_searched_ && settings_.prices.smoothness > 0; }
@@ -246,9 +247,7 @@ Expected<> MultiModel::search_further(Labelling& labelling) {
   constexpr float kAnyPoint = 0;
   const std::string before = stop_reason_;
   while (!interrupted()) {
-    std::fill(caps_.begin(), caps_.end(), 0.0F);
     labelling.costs(caps_);
-    for (float& cap : caps_) cap *= tau_;
     if (auto done = show(caps_); !done) return done;
     Swarm swarm(space(0), settings_, random_);
     auto flown = fly(swarm, 0, round_++, {}, caps_, kAnyPoint);
@@ -286,7 +285,7 @@ Expected<> MultiModel::share_out(FitResult& result) {
     kept.back().type = space(0).type();
   }
   result.models = std::move(kept);
-  for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
+  tell_parameters(result);
   labels_.resize(points_.size());
   labelling.write(labels_);
   count_effort(result);

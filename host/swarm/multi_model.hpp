@@ -77,6 +77,7 @@ class MultiModel {
   Expected<> deflate(const Candidate& candidate);
   Expected<> finish(FitResult& result);
   Expected<> polish();
+  void tell_parameters(FitResult& result) const;
   Expected<> share_out(FitResult& result);
   Expected<> search_further(Labelling& labelling);
   Expected<> drop_unpaid(FitResult& result);

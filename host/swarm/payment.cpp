@@ -6,18 +6,23 @@
 
 namespace swarmfit::swarm {
 
+double saved(std::span<const float> caps, std::span<const float> distances) {
+  double sum = 0;
+  for (std::size_t i = 0; i < caps.size(); ++i) sum += distances[i] < caps[i] ? static_cast<double>(caps[i] - distances[i]) : 0.0;
+  return sum;
+}
+
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found) {
   // The last place is for all that is farther, or NaN; one more for what is explained already.
   constexpr auto kFarther = static_cast<float>(Support::kSlabs);
   std::array<std::size_t, Support::kSlabs + 2> counts{};
-  const float half = 0.5F * tau, per_tau = 1 / tau;
-  const float reach = kFarther * tau;
+  const float half = 0.5F * tau, least = kUnexplained * tau, reach = kFarther * tau, per_tau = 1 / tau;
   double square = 0;
   std::size_t inner = 0, beside = 0;
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float d = distances[i];
-    const bool unexplained = caps[i] >= half && !std::isnan(d);
-    const float slab = d < kFarther * tau ? d * per_tau : kFarther;
+    const bool unexplained = caps[i] >= least && !std::isnan(d);
+    const float slab = d < reach ? d * per_tau : kFarther;
     const std::size_t place = unexplained ? static_cast<std::size_t>(std::min(slab, kFarther)) : Support::kSlabs + 1;
     ++counts[place];
     if (place != 0) continue;

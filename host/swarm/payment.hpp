@@ -23,7 +23,13 @@ struct Support {
   std::size_t band() const noexcept { return slabs[1] + slabs[2]; }
 };
 
-/// A point is unexplained while its cap is at least half of tau. NaN distances count for nothing. `found` is empty or one a point: how far
+/// Of tau: a point is unexplained while its cap is at least that.
+inline constexpr float kUnexplained = 0.5F;
+
+/// What a model at these distances saves of what the points may cost, in the caps' unit. NaN saves nothing.
+double saved(std::span<const float> caps, std::span<const float> distances);
+
+/// NaN distances count for nothing. `found` is empty or one a point: how far
 /// the nearest found model is.
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found = {});
 

@@ -27,9 +27,7 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
   std::vector<float> distances(ground.size()), least(ground.size(), ground.tau);
   for (const models::Placed& model : models) {
     if (auto done = weigh(ground.of(*model.space), model.theta, {}, distances); !done) return tl::unexpected(done.error());
-    for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (distances[i] < least[i]) least[i] = distances[i];
-    }
+    take_nearer(distances, least);
   }
   double energy = 0;
   for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(ground.index(i)) ? static_cast<double>(least[i]) : 0.0;
@@ -37,6 +35,20 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
 }
 
 }  // namespace
+
+ModelRows::ModelRows(const models::Frame& frame, std::size_t most) : frame_(frame) {
+  parameters_.reserve(most);  // the views look into it
+  views_.reserve(most);
+}
+
+void ModelRows::add(const models::ModelSpace& space, const models::Position& theta) {
+  const models::Position& row = parameters_.emplace_back(space.to_data(theta, frame_));
+  views_.push_back({space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
+}
+
+void take_nearer(std::span<const float> distances, std::span<float> least) {
+  for (std::size_t i = 0; i < least.size(); ++i) least[i] = distances[i] < least[i] ? distances[i] : least[i];
+}
 
 Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
                                   std::span<float> distances) {
@@ -108,8 +120,7 @@ Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::spa
 void left_by_others(const std::vector<std::vector<float>>& distances, std::size_t model, float tau, std::vector<float>& caps) {
   for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = std::isnan(distances[model][i]) ? 0.0F : tau;
   for (std::size_t m = 0; m < distances.size(); ++m) {
-    if (m == model) continue;
-    for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = distances[m][i] < caps[i] ? distances[m][i] : caps[i];
+    if (m != model) take_nearer(distances[m], caps);
   }
 }
 

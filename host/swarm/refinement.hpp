@@ -28,6 +28,28 @@ struct Ground {
   std::uint32_t index(std::size_t k) const noexcept { return part != nullptr ? part->index()[k] : static_cast<std::uint32_t>(k); }
 };
 
+/// Of refinement, where there is no cause for fewer.
+inline constexpr int kMostRounds = 8;
+
+/// Models as kernels take them.
+class ModelRows {
+ public:
+  ModelRows(const models::Frame& frame, std::size_t most);
+  /// `most` times at most.
+  void add(const models::ModelSpace& space, const models::Position& theta);
+  std::span<const kernels::ModelView> views() const noexcept { return views_; }
+  /// In the data's frame and unit.
+  const models::Position& parameters(std::size_t m) const noexcept { return parameters_[m]; }
+
+ private:
+  const models::Frame& frame_;
+  std::vector<models::Position> parameters_;
+  std::vector<kernels::ModelView> views_;
+};
+
+/// Where a distance is less, it takes the place of what is there; NaN is less than nothing.
+void take_nearer(std::span<const float> distances, std::span<float> least);
+
 /// What the ground's points within tau of a model and, where there are caps, within their cap say of it, weighted so that least squares
 /// becomes least absolute deviations, which is what the truncated L1 loss asks of them. `distances` is empty or one a point.
 Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
@@ -43,7 +65,7 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
 /// Least absolute deviations, by reweighting, on the points that are not better explained already (distance below their cap), repeated
 /// while the truncated loss falls, `rounds` times at most. Returns the loss of theta; it never rises. `distances`, where not null, gets those
 /// to the outcome.
-Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = 8,
+Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = kMostRounds,
                             std::vector<float>* distances = nullptr);
 
 /// Distances of the ground's points to each of several models, of whatever kinds; NaN where a point is not finite.
@@ -54,7 +76,7 @@ void left_by_others(const std::vector<std::vector<float>>& distances, std::size_
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
 /// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.
-Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds = 8);
+Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds = kMostRounds);
 
 /// For each model, the points within tau of it and of no other: what would be lost without it.
 Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models);

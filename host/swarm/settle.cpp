@@ -6,24 +6,11 @@
 namespace swarmfit::swarm {
 namespace {
 
-/// Models as kernels take them.
-class Views {
- public:
-  Views(const Ground& ground, const std::vector<models::Placed>& found) {
-    parameters_.reserve(found.size());
-    for (const auto& [space, theta] : found) {
-      parameters_.push_back(space->to_data(theta, ground.points.frame()));
-      const models::Position& row = parameters_.back();
-      views_.push_back({space->kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
-    }
-  }
-  std::span<const kernels::ModelView> views() const noexcept { return views_; }
-  const models::Position& parameters(std::size_t m) const noexcept { return parameters_[m]; }
-
- private:
-  std::vector<models::Position> parameters_;
-  std::vector<kernels::ModelView> views_;
-};
+ModelRows rows_of(const Ground& ground, std::span<const models::Placed> models) {
+  ModelRows rows(ground.points.frame(), models.size());
+  for (const auto& [space, theta] : models) rows.add(*space, theta);
+  return rows;
+}
 
 /// Counts and squares of the points that each model owns already.
 Expected<> weigh_own(const Ground& whole, std::span<const kernels::ModelView> models, std::span<const std::uint16_t> labels,
@@ -87,7 +74,7 @@ Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool s
   if (shared) return refit_apart(whole, found, hidden);
   std::vector<kernels::Evidence> evidence;
   if (std::all_of(found.begin(), found.end(), [](const models::Placed& model) { return model.space->closed_form(); })) {
-    const Views models(whole, found);
+    const ModelRows models = rows_of(whole, found);
     auto all = weigh_all(whole, models.views());
     if (!all) return tl::unexpected(all.error());
     evidence = std::move(*all);
@@ -111,7 +98,7 @@ Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool s
 
 Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, FitResult& result) {
   const models::Frame& frame = whole.points.frame();
-  const Views models(whole, found);
+  const ModelRows models = rows_of(whole, found);
   std::vector<kernels::Evidence> evidence(found.size());
   if (result.labels.empty()) {
     result.labels.resize(whole.points.size());
