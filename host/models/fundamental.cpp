@@ -163,15 +163,6 @@ class Fundamental final : public Projective {
     return angle > 1e-300 ? Eigen::AngleAxisd(angle, w / angle).toRotationMatrix() : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
   }
 
-  static bool normalise(Eigen::Matrix<double, 3, 7>& p, Eigen::Matrix3d& t) {
-    const Eigen::Vector3d mean = p.rowwise().mean();
-    const double size = std::sqrt((p.colwise() - mean).colwise().squaredNorm().mean());
-    if (!(size > 1e-9)) return false;
-    t << 1 / size, 0, -mean[0] / size, 0, 1 / size, -mean[1] / size, 0, 0, 1;
-    p.topRows<2>() = (p.topRows<2>().colwise() - mean.head<2>()) / size;
-    return true;
-  }
-
   /// Two matrices that span the null space of the seven epipolar constraints; false where it is larger. Elimination, each equation for the
   /// unknown that weighs most in it: the samples are small and scaled, and a swarm takes a great many of them.
   static bool pencil(const Eigen::Matrix<double, 3, 7>& a, const Eigen::Matrix<double, 3, 7>& b, Eigen::Matrix3d* f) {

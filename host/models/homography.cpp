@@ -104,15 +104,6 @@ class Homography final : public Projective {
     for (const auto& t : kTriangles) same += turn(a.col(t[0]), a.col(t[1]), a.col(t[2])) * turn(b.col(t[0]), b.col(t[1]), b.col(t[2])) > 0;
     return same == 0 || same == 4;
   }
-
-  static bool normalise(Eigen::Matrix<double, 3, 4>& p, Eigen::Matrix3d& t) {
-    const Eigen::Vector3d mean = p.rowwise().mean();
-    const double size = std::sqrt((p.colwise() - mean).colwise().squaredNorm().mean());
-    if (!(size > 1e-9)) return false;
-    t << 1 / size, 0, -mean[0] / size, 0, 1 / size, -mean[1] / size, 0, 0, 1;
-    p = t * p;
-    return true;
-  }
 };
 
 }  // namespace

@@ -51,6 +51,16 @@ class Projective : public CurvedSpace {
     t(1, 2) = -frame.centre[2 * image + 1] / frame.scale;
     return t;
   }
+  /// Moves a sample of one image to its own centre and size (Hartley); `t` does that to a point. False where it has no size.
+  template <int N>
+  static bool normalise(Eigen::Matrix<double, 3, N>& p, Eigen::Matrix3d& t) {
+    const Eigen::Vector3d mean = p.rowwise().mean();
+    const double size = std::sqrt((p.colwise() - mean).colwise().squaredNorm().mean());
+    if (!(size > 1e-9)) return false;
+    t << 1 / size, 0, -mean[0] / size, 0, 1 / size, -mean[1] / size, 0, 0, 1;
+    p.template topRows<2>() = (p.template topRows<2>().colwise() - mean.template head<2>()) / size;
+    return true;
+  }
   static Eigen::Vector3d first(const Eigen::Vector4d& p) { return {p[0], p[1], 1}; }
   static Eigen::Vector3d second(const Eigen::Vector4d& p) { return {p[2], p[3], 1}; }
 };
