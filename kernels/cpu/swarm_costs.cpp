@@ -19,23 +19,23 @@ constexpr double kPoorShare = 0.8;
 constexpr int kLongestPause = 32;
 
 struct Runs {
-  explicit Runs(std::size_t all_tiles) : tiles(all_tiles), length((all_tiles + kMaxRuns - 1) / kMaxRuns) {
+  explicit Runs(const PointStore& store) : points(store.finite()), tiles(store.tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
     count = length == 0 ? 0 : (tiles + length - 1) / length;
   }
   std::size_t first(std::size_t run) const { return run * length; }
   std::size_t last(std::size_t run) const { return std::min(tiles, (run + 1) * length); }
-  std::size_t tiles, length, count;
+  std::size_t points, tiles, length, count;
 };
 
 /// body(task, run, first model, models) for each run of tiles and group of models.
 template <class Body>
-void for_tasks(const Runs& runs, std::size_t models, bool shared, Body&& body) {
+void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
   const std::size_t groups = (models + kGroupModels - 1) / kGroupModels, tasks = runs.count * groups;
   const auto one = [&](std::size_t task) {
     const std::size_t first = task % groups * kGroupModels;
     body(task, task / groups, first, std::min(kGroupModels, models - first));
   };
-  if (shared) {
+  if (worth_sharing(runs.points, models)) {
     for_each_task(tasks, one);
   } else {
     for (std::size_t task = 0; task < tasks; ++task) one(task);
@@ -72,15 +72,14 @@ bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, 
 
 std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
                                        std::span<float> costs) {
-  const Runs runs(points.tiles());
+  const Runs runs(points);
   partial_.assign(runs.count * swarm.count, {});
-  for_tasks(runs, swarm.count, worth_sharing(points.finite(), swarm.count),
-            [&](std::size_t, std::size_t run, std::size_t first, std::size_t models) {
-              for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-                kernels_.add_costs(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
-                                   partial_.data() + run * swarm.count + first);
-              }
-            });
+  for_tasks(runs, swarm.count, [&](std::size_t, std::size_t run, std::size_t first, std::size_t models) {
+    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
+      kernels_.add_costs(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
+                         partial_.data() + run * swarm.count + first);
+    }
+  });
   for (std::size_t j = 0; j < swarm.count; ++j) {
     PartialCost total;
     for (std::size_t run = 0; run < runs.count; ++run) {
@@ -129,16 +128,15 @@ void SwarmCosts::bound_all(const PointStore& points, const CentredSwarm& swarm, 
   for (std::size_t j = 0; j < swarm.count; ++j) {
     slack_[j] = residual_rounding(swarm.kind, swarm.coefficients.data() + j * width, points.reach().data());
   }
-  const Runs runs(points.tiles());
+  const Runs runs(points);
   bounds_.assign(runs.count * swarm.count, {});
   open_.resize(points.tiles() * swarm.count);
-  for_tasks(runs, swarm.count, worth_sharing(points.finite(), swarm.count),
-            [&](std::size_t, std::size_t run, std::size_t first, std::size_t models) {
-              for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-                kernels_.bound(swarm.kind, loss, points.bounds(tile), swarm.coefficients.data() + first * width, slack_.data() + first,
-                               models, open_.data() + tile * swarm.count + first, bounds_.data() + run * swarm.count + first);
-              }
-            });
+  for_tasks(runs, swarm.count, [&](std::size_t, std::size_t run, std::size_t first, std::size_t models) {
+    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
+      kernels_.bound(swarm.kind, loss, points.bounds(tile), swarm.coefficients.data() + first * width, slack_.data() + first, models,
+                     open_.data() + tile * swarm.count + first, bounds_.data() + run * swarm.count + first);
+    }
+  });
   units_.assign(swarm.count, 0);
   bound_within_.assign(swarm.count, 0.0);
   bound_mixed_.assign(swarm.count, 0.0);
@@ -156,28 +154,27 @@ std::uint64_t SwarmCosts::add_open(const PointStore& points, const CentredSwarm&
                                    std::uint8_t Open::*blocks) {
   if (alive_.empty()) return 0;
   const std::size_t width = width_of(swarm.kind);
-  const Runs runs(points.tiles());
+  const Runs runs(points);
   alive_coefficients_.resize(alive_.size() * width);
   for (std::size_t a = 0; a < alive_.size(); ++a) {
     std::copy_n(swarm.coefficients.data() + alive_[a] * width, width, alive_coefficients_.data() + a * width);
   }
   partial_.assign(runs.count * alive_.size(), {});
   touched_.assign(runs.count * ((alive_.size() + kGroupModels - 1) / kGroupModels), 0);
-  for_tasks(runs, alive_.size(), worth_sharing(points.finite(), swarm.count),
-            [&](std::size_t task, std::size_t run, std::size_t first, std::size_t models) {
-              std::array<std::uint8_t, kGroupModels> bits{};
-              for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-                unsigned any = 0;
-                for (std::size_t m = 0; m < models; ++m) {
-                  bits[m] = open_[tile * swarm.count + alive_[first + m]].*blocks;
-                  any |= bits[m];
-                  touched_[task] += static_cast<std::uint64_t>(std::popcount(bits[m])) * kBlockPoints;
-                }
-                if (any == 0) continue;
-                kernels_.add_open_costs(swarm.kind, summing, points.tile(tile), alive_coefficients_.data() + first * width, models,
-                                        bits.data(), partial_.data() + run * alive_.size() + first);
-              }
-            });
+  for_tasks(runs, alive_.size(), [&](std::size_t task, std::size_t run, std::size_t first, std::size_t models) {
+    std::array<std::uint8_t, kGroupModels> bits{};
+    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
+      unsigned any = 0;
+      for (std::size_t m = 0; m < models; ++m) {
+        bits[m] = open_[tile * swarm.count + alive_[first + m]].*blocks;
+        any |= bits[m];
+        touched_[task] += static_cast<std::uint64_t>(std::popcount(bits[m])) * kBlockPoints;
+      }
+      if (any == 0) continue;
+      kernels_.add_open_costs(swarm.kind, summing, points.tile(tile), alive_coefficients_.data() + first * width, models, bits.data(),
+                              partial_.data() + run * alive_.size() + first);
+    }
+  });
   for (std::size_t run = 0; run < runs.count; ++run) {
     for (std::size_t a = 0; a < alive_.size(); ++a) units_[alive_[a]] += partial_[run * alive_.size() + a].units;
   }

@@ -1,5 +1,4 @@
-// Work in tasks: on the threads of an arena, or here where it is done before another thread would have woken up. A program that fits
-// small clouds only never starts the scheduler.
+// Work in tasks: on the threads of an arena, or here where it is done before another thread would have woken up.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +17,7 @@ constexpr bool worth_sharing(std::size_t points) noexcept { return points > kTas
 /// Are so many residuals?
 constexpr bool worth_sharing(std::size_t points, std::size_t models) noexcept { return points * models > std::size_t{1} << 18; }
 
-/// body(task) for each task; one alone is done here. More than one: only from within run_in.
+/// body(task) for each task; one alone is done here. More than one run on the threads of the arena that this is called in.
 template <class Body>
 void for_each_task(std::size_t tasks, Body&& body) {
   if (tasks == 1) {
