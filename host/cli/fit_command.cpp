@@ -76,16 +76,15 @@ Expected<FitOptions> fit_options(const FitArguments& arguments) {
   options.rivals.assign(kinds->begin() + 1, kinds->end());
   if (auto ok = apply_prior(arguments, options); !ok) return tl::unexpected(ok.error());
   if (auto ok = arguments.fit.apply(options); !ok) return tl::unexpected(ok.error());
-  if (is_png(arguments.input)) {
-    if (auto camera = arguments.camera.camera(); !camera) return tl::unexpected(camera.error());
-    if (auto scale = arguments.camera.scale(); !scale) return tl::unexpected(scale.error());
-  }
+  if (auto camera = arguments.camera.camera(); is_png(arguments.input) && !camera) return tl::unexpected(camera.error());
   return options;
 }
 
 Expected<Cloud> read_input(const FitArguments& arguments) {
-  if (is_png(arguments.input)) return read_depth(arguments.input, *arguments.camera.camera(), *arguments.camera.scale());
-  return read_cloud(arguments.input);
+  if (!is_png(arguments.input)) return read_cloud(arguments.input);
+  const auto camera = arguments.camera.camera();
+  if (!camera) return tl::unexpected(camera.error());
+  return read_depth(arguments.input, camera->intrinsics, camera->scale);
 }
 
 Expected<> write(const FitArguments& arguments, const FitResult& result, const Cloud& input, double load_ms) {

@@ -53,7 +53,7 @@ bool before(const std::string& a, const std::string& b) {
 }
 
 bool is_cloud(const fs::path& file) {
-  const std::string extension = lower(file.extension().string());
+  const std::string extension = ending_of(file);
   return extension == ".pcd" || extension == ".ply" || extension == ".xyz";
 }
 
@@ -164,6 +164,8 @@ void make_unique(std::vector<FrameRef>& frames) {
 }
 
 }  // namespace
+
+std::string ending_of(const fs::path& file) { return lower(file.extension().string()); }
 
 bool is_sequence(const std::vector<std::string>& inputs) {
   std::error_code error;

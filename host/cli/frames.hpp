@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -9,6 +10,8 @@
 #include <vector>
 
 #include <swarmfit/cloud.hpp>
+
+#include "host/cli/depth_camera.hpp"
 
 namespace swarmfit::cli {
 
@@ -23,11 +26,8 @@ struct FrameRef {
 /// Waits for the next frame; nothing at the end, or once asked to stop. A gap in `index`: frames that were dropped.
 using FrameSource = std::function<std::optional<FrameRef>(const std::stop_token&)>;
 
-/// A depth image's camera, where one was given.
-struct DepthCamera {
-  Intrinsics intrinsics;
-  double scale = 0.001;
-};
+/// A file's ending in small letters, with its dot.
+std::string ending_of(const std::filesystem::path& file);
 
 /// Is this more than one frame: several inputs, a folder, or `-`?
 bool is_sequence(const std::vector<std::string>& inputs);

@@ -1,6 +1,4 @@
 // swarmfit learn NAME INPUT
-#include <algorithm>
-#include <cctype>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -15,6 +13,7 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/frames.hpp"
 #include "host/cli/options.hpp"
 
 namespace swarmfit::cli {
@@ -29,8 +28,7 @@ struct LearnArguments {
 };
 
 bool is_cloud(const std::string& file) {
-  std::string ending = std::filesystem::path(file).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = ending_of(file);
   return ending == ".pcd" || ending == ".ply" || ending == ".xyz" || ending == ".csv";
 }
 
@@ -38,9 +36,7 @@ Expected<Cloud> read_frame(const LearnArguments& a) {
   if (!a.input.empty()) return read_cloud(a.input);
   const auto camera = a.camera.camera();
   if (!camera) return tl::unexpected(camera.error());
-  const auto scale = a.camera.scale();
-  if (!scale) return tl::unexpected(scale.error());
-  return read_rgbd(a.color, a.depth, *camera, *scale);
+  return read_rgbd(a.color, a.depth, camera->intrinsics, camera->scale);
 }
 
 struct Learnt {

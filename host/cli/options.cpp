@@ -203,19 +203,15 @@ void CameraFlags::add_to(CLI::App& app) {
   app.add_option("--depth-scale", depth_scale, "Metres a unit of depth")->type_name("S")->group(group)->capture_default_str();
 }
 
-Expected<Intrinsics> CameraFlags::camera() const {
+Expected<DepthCamera> CameraFlags::camera() const {
   if (intrinsics.empty()) return invalid("--intrinsics FX,FY,CX,CY is needed with a depth image");
   const auto k = parse_list("--intrinsics", intrinsics, "FX,FY,CX,CY", 4);
   if (!k) return tl::unexpected(k.error());
   if (!((*k)[0] > 0 && (*k)[1] > 0)) return invalid(fmt::format("--intrinsics: {}, focal lengths must be > 0 [px]", intrinsics));
-  return Intrinsics{(*k)[0], (*k)[1], (*k)[2], (*k)[3]};
-}
-
-Expected<double> CameraFlags::scale() const {
-  double scale = 0;
+  DepthCamera camera{{(*k)[0], (*k)[1], (*k)[2], (*k)[3]}};
   if (depth_scale.empty()) return invalid("--depth-scale: empty, must be a number > 0 [m a unit]");
-  if (auto ok = positive("--depth-scale", depth_scale, " [m a unit]", scale); !ok) return tl::unexpected(ok.error());
-  return scale;
+  if (auto ok = positive("--depth-scale", depth_scale, " [m a unit]", camera.scale); !ok) return tl::unexpected(ok.error());
+  return camera;
 }
 
 }  // namespace swarmfit::cli

@@ -12,6 +12,8 @@
 #include <swarmfit/fit.hpp>
 #include <swarmfit/perception.hpp>
 
+#include "host/cli/depth_camera.hpp"
+
 namespace swarmfit::cli {
 
 /// A number, or nothing where the text is not one. NaN and infinity are numbers here; whoever reads them says what is allowed.
@@ -68,8 +70,7 @@ struct CameraFlags {
 
   void add_to(CLI::App& app);
   /// Fails with invalid_option: not given, not four numbers, out of bounds.
-  Expected<Intrinsics> camera() const;
-  Expected<double> scale() const;
+  Expected<DepthCamera> camera() const;
 };
 
 }  // namespace swarmfit::cli

@@ -59,10 +59,8 @@ Expected<std::function<Expected<Cloud>()>> reader(const PerceiveArguments& a) {
   if (a.depth.empty()) return invalid("--depth FILE is missing: --color needs the depth image that goes with it");
   const auto camera = a.camera.camera();
   if (!camera) return tl::unexpected(camera.error());
-  const auto scale = a.camera.scale();
-  if (!scale) return tl::unexpected(scale.error());
-  if (a.color.empty()) return [depth = a.depth, k = *camera, s = *scale] { return read_depth(depth, k, s); };
-  return [color = a.color, depth = a.depth, k = *camera, s = *scale] { return read_rgbd(color, depth, k, s); };
+  if (a.color.empty()) return [depth = a.depth, c = *camera] { return read_depth(depth, c.intrinsics, c.scale); };
+  return [color = a.color, depth = a.depth, c = *camera] { return read_rgbd(color, depth, c.intrinsics, c.scale); };
 }
 
 /// What a sequence is made of.
@@ -70,11 +68,9 @@ Expected<FrameSource> source(const PerceiveArguments& a) {
   const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
   std::optional<DepthCamera> camera;
   if (!a.camera.intrinsics.empty()) {
-    const auto intrinsics = a.camera.camera();
-    if (!intrinsics) return tl::unexpected(intrinsics.error());
-    const auto scale = a.camera.scale();
-    if (!scale) return tl::unexpected(scale.error());
-    camera = DepthCamera{*intrinsics, *scale};
+    const auto given = a.camera.camera();
+    if (!given) return tl::unexpected(given.error());
+    camera = *given;
   }
   const bool from_stdin = a.inputs == std::vector<std::string>{"-"};
   std::vector<FrameRef> frames;
