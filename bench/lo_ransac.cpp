@@ -28,14 +28,10 @@ void optimise(Hypotheses& hypotheses) {
 }
 
 void search(Hypotheses& hypotheses) {
-  std::vector<Plane> batch;
   while (!hypotheses.exhausted()) {
-    batch.clear();
-    for (std::size_t tries = 0; tries < 10 * kBatch && batch.size() < kBatch; ++tries) {
-      if (const auto plane = hypotheses.minimal_sample()) batch.push_back(*plane);
-    }
-    if (batch.empty()) return;
-    if (hypotheses.score(batch)) optimise(hypotheses);
+    const auto improved = hypotheses.score_batch();
+    if (!improved) return;
+    if (*improved) optimise(hypotheses);
   }
 }
 

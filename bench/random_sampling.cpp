@@ -5,14 +5,7 @@ namespace swarmfit::peers {
 namespace {
 
 void search(Hypotheses& hypotheses) {
-  std::vector<Plane> batch;
-  while (!hypotheses.exhausted()) {
-    batch.clear();
-    for (std::size_t tries = 0; tries < 10 * kBatch && batch.size() < kBatch; ++tries) {
-      if (const auto plane = hypotheses.minimal_sample()) batch.push_back(*plane);
-    }
-    if (batch.empty()) return;
-    hypotheses.score(batch);
+  while (!hypotheses.exhausted() && hypotheses.score_batch()) {
   }
 }
 

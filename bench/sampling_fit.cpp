@@ -212,6 +212,15 @@ std::optional<Plane> Hypotheses::minimal_sample() {
   return Plane{{unit.x(), unit.y(), unit.z()}, -unit.dot(origin)};
 }
 
+std::optional<bool> Hypotheses::score_batch() {
+  std::vector<Plane> batch;
+  for (std::size_t tries = 0; tries < 10 * kBatch && batch.size() < kBatch; ++tries) {
+    if (const auto plane = minimal_sample()) batch.push_back(*plane);
+  }
+  if (batch.empty()) return std::nullopt;
+  return score(batch);
+}
+
 std::optional<Plane> Hypotheses::least_squares(std::span<const std::uint32_t> from, std::size_t count) {
   if (from.size() < 3 || count < 3) return std::nullopt;
   const bool all = count >= from.size();

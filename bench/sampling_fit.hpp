@@ -23,6 +23,8 @@ class Hypotheses {
 
   /// The plane through three random open points; none where they lie on a line or nothing is open.
   std::optional<Plane> minimal_sample();
+  /// Planes through minimal samples, kBatch of them, scored; whether the best has improved. None where nothing can be sampled.
+  std::optional<bool> score_batch();
   /// The least-squares plane through `count` of `from`.
   std::optional<Plane> least_squares(std::span<const std::uint32_t> from, std::size_t count);
   /// Open points within `tolerance` of a plane.
