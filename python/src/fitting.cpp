@@ -1,7 +1,5 @@
-#include <atomic>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -20,6 +18,7 @@
 #include "python/src/fit_result.hpp"
 #include "python/src/job.hpp"
 #include "python/src/options.hpp"
+#include "python/src/tool.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -27,37 +26,7 @@ using namespace nb::literals;
 namespace swarmfit::python {
 namespace {
 
-/// A Fitter and whether it is at work.
-struct Workshop {
-  explicit Workshop(Fitter made) : fitter(std::move(made)) {}
-  Fitter fitter;
-  std::atomic<bool> busy = false;
-};
-
-/// Takes the workshop while it lives.
-class Shift {
- public:
-  explicit Shift(std::shared_ptr<Workshop> workshop) : workshop_(std::move(workshop)) {
-    if (workshop_->busy.exchange(true)) throw std::runtime_error("this Fitter is at work; make one a thread");
-  }
-  ~Shift() { workshop_->busy = false; }
-  Shift(const Shift&) = delete;
-  Shift& operator=(const Shift&) = delete;
-  Fitter& fitter() const { return workshop_->fitter; }
-
- private:
-  std::shared_ptr<Workshop> workshop_;
-};
-
-std::shared_ptr<Workshop> open_workshop(const nb::kwargs& given) {
-  const FitOptions options = fit_options(given);
-  std::optional<Expected<Fitter>> made;
-  {
-    const nb::gil_scoped_release unlocked;  // a device may take its time
-    made.emplace(Fitter::create(options));
-  }
-  return std::make_shared<Workshop>(value_of(std::move(*made)));
-}
+using Workshop = Tool<Fitter>;
 
 Job<FitResult>::Work work(Fitter& fitter, const PointsView& points, std::vector<Model> warm_start) {
   return [&fitter, points, warm_start = std::move(warm_start)](const ModelCallback& on_model, std::stop_token stop) {
@@ -66,18 +35,18 @@ Job<FitResult>::Work work(Fitter& fitter, const PointsView& points, std::vector<
 }
 
 FitResult fit_to_end(std::shared_ptr<Workshop> workshop, nb::handle points, nb::handle on_model, std::vector<Model> warm_start) {
-  const Shift shift(std::move(workshop));
+  const Shift shift(std::move(workshop), "Fitter");
   const Buffer buffer(points);
-  return value_of(run_to_end<FitResult>(work(shift.fitter(), points_view(buffer), std::move(warm_start)), on_model));
+  return value_of(run_to_end<FitResult>(work(shift.tool(), points_view(buffer), std::move(warm_start)), on_model));
 }
 
 /// Models one by one while the search for the next goes on.
 class ModelStream {
  public:
   ModelStream(std::shared_ptr<Workshop> workshop, nb::handle points, std::vector<Model> warm_start)
-      : shift_(std::move(workshop)),
+      : shift_(std::move(workshop), "Fitter"),
         buffer_(points),
-        job_(work(shift_.fitter(), points_view(buffer_), std::move(warm_start)), Job<FitResult>::Pace::runs_ahead) {}
+        job_(work(shift_.tool(), points_view(buffer_), std::move(warm_start)), Job<FitResult>::Pace::runs_ahead) {}
 
   Model next() {
     auto model = job_.next();
@@ -95,7 +64,7 @@ class ModelStream {
   }
 
  private:
-  Shift shift_;
+  Shift<Fitter> shift_;
   Buffer buffer_;
   std::optional<Expected<FitResult>> result_;
   Job<FitResult> job_;  // last: it uses all of the above
@@ -136,7 +105,7 @@ void bind_fitting(nb::module_& module) {
       .def("stop", &ModelStream::stop)
       .def("result", &ModelStream::result, nb::rv_policy::reference_internal);
   nb::class_<Workshop>(module, "Fitter")
-      .def(nb::new_([](const nb::kwargs& options) { return open_workshop(options); }))
+      .def(nb::new_([](const nb::kwargs& options) { return make_tool<Fitter>(fit_options(options)); }))
       .def("fit", &fit_to_end, "points"_a, "on_model"_a = nb::none(), "warm_start"_a = std::vector<Model>())
       .def(
           "find_models",
@@ -145,7 +114,7 @@ void bind_fitting(nb::module_& module) {
           },
           "points"_a, "warm_start"_a = std::vector<Model>())
       .def_prop_ro("backend", [](const Workshop& self) {
-        const BackendInfo info = self.fitter.backend();
+        const BackendInfo info = self.tool.backend();
         return nb::make_tuple(info.name, info.device, info.reason);
       });
 }

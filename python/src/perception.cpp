@@ -1,8 +1,7 @@
-#include <atomic>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nanobind/stl/filesystem.h>
@@ -18,6 +17,7 @@
 #include "python/src/fit_result.hpp"
 #include "python/src/job.hpp"
 #include "python/src/options.hpp"
+#include "python/src/tool.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -25,27 +25,12 @@ using namespace nb::literals;
 namespace swarmfit::python {
 namespace {
 
-struct Eye {
-  explicit Eye(Perceiver made) : perceiver(std::move(made)) {}
-  Perceiver perceiver;
-  std::atomic<bool> busy = false;
-};
+using Eye = Tool<Perceiver>;
 
-std::shared_ptr<Eye> open_eye(const PerceiveOptions& options) {
-  std::optional<Expected<Perceiver>> made;
-  {
-    const nb::gil_scoped_release unlocked;  // a device or a gallery may take its time
-    made.emplace(Perceiver::create(options));
-  }
-  return std::make_shared<Eye>(value_of(std::move(*made)));
-}
-
-PerceiveResult perceive(Eye& eye, const Cloud& frame, nb::handle on_plane) {
-  if (eye.busy.exchange(true)) throw std::runtime_error("this Perceiver is at work; make one a thread");
-  const auto free = [](Eye* used) { used->busy = false; };
-  const std::unique_ptr<Eye, decltype(free)> used(&eye, free);
+PerceiveResult perceive(std::shared_ptr<Eye> eye, const Cloud& frame, nb::handle on_plane) {
+  const Shift shift(std::move(eye), "Perceiver");
   return value_of(run_to_end<PerceiveResult>(
-      [&](const ModelCallback& on_model, std::stop_token stop) { return eye.perceiver.perceive(frame, on_model, std::move(stop)); },
+      [&](const ModelCallback& on_model, std::stop_token stop) { return shift.tool().perceive(frame, on_model, std::move(stop)); },
       on_plane));
 }
 
@@ -142,7 +127,7 @@ void bind_perception(nb::module_& module) {
           },
           "folder"_a, "cloud"_a);
   nb::class_<Eye>(module, "Perceiver")
-      .def(nb::new_([](const nb::kwargs& options) { return open_eye(perceive_options(options)); }))
+      .def(nb::new_([](const nb::kwargs& options) { return make_tool<Perceiver>(perceive_options(options)); }))
       .def("perceive", &perceive, "cloud"_a, "on_plane"_a = nb::none());
   module.attr("UNCERTAIN") = kUncertain;
 }
