@@ -1,6 +1,7 @@
 // The command does its work: files hold what design says, and equal seeds give equal bytes.
 #include <random>
 #include <regex>
+#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -97,6 +98,12 @@ TEST(CliDemo, ShowsTheTruthBesideWhatWasFound) {
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("surface  normal"), std::string::npos);
   EXPECT_NE(outcome.out.find("object  kind"), std::string::npos);
+  std::istringstream lines(outcome.out.substr(outcome.out.find("surface  normal")));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find(", -0.866,") == std::string::npos) continue;
+    EXPECT_LE(line.size(), 80U) << line;
+    EXPECT_TRUE(line.ends_with(" %")) << "a surface's row is one line: " << line;
+  }
   for (const char* name : {"result.json", "planes.png", "popout.png", "objects.png", "overlay.png"}) {
     EXPECT_TRUE(fs::is_regular_file(folder / "swarmfit-demo" / name)) << name;
   }

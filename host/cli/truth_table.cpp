@@ -9,37 +9,13 @@
 
 #include <fmt/format.h>
 
+#include "host/cli/overlap.hpp"
 #include "host/cli/report.hpp"
 
 namespace swarmfit::cli {
 namespace {
 
 using Labels = std::span<const std::uint16_t>;
-
-struct Match {
-  std::size_t label = 0;  ///< the found label that covers the true one best; 0: none
-  double iou = 0;         ///< intersection over union, counted where the depth is known
-};
-
-/// Intersection over union of true label `k` with each found one, over pixels that were seen.
-Match best_match(Labels truth, std::size_t k, Labels found, std::size_t found_count, const std::vector<bool>& seen) {
-  std::vector<std::size_t> common(found_count + 1), size(found_count + 1);
-  std::size_t true_size = 0;
-  for (std::size_t i = 0; i < std::min(truth.size(), found.size()); ++i) {
-    if (!seen[i]) continue;
-    const std::size_t f = found[i] <= found_count ? found[i] : 0;
-    ++size[f];
-    if (truth[i] != k) continue;
-    ++true_size;
-    ++common[f];
-  }
-  Match best;
-  for (std::size_t f = 1; f <= found_count; ++f) {
-    const double iou = static_cast<double>(common[f]) / static_cast<double>(std::max<std::size_t>(1, true_size + size[f] - common[f]));
-    if (iou > best.iou) best = {f, iou};
-  }
-  return best;
-}
 
 std::vector<bool> seen_pixels(const Cloud& cloud) {
   std::vector<bool> seen(cloud.size());
@@ -65,20 +41,21 @@ Eigen::Vector3d centre_of(const Cloud& cloud, Labels truth, std::size_t k, const
 }
 
 std::string planes_table(const Scene& scene, const PerceiveResult& result, const std::vector<bool>& seen) {
-  std::vector<std::vector<std::string>> rows = {{"surface", "normal", "found as", "supports", "angle", "height", "overlap"}};
+  std::vector<std::vector<std::string>> rows = {{"surface", "normal", "found", "supports", "deg off", "mm off", "overlap"}};
+  const auto matches = match_labels(scene.truth.plane_labels, scene.truth.planes.size(), result.fit.labels, result.fit.models.size(), seen);
   for (std::size_t k = 1; k <= scene.truth.planes.size(); ++k) {
     const Eigen::Vector4d& plane = scene.truth.planes[k - 1];
     const Eigen::Vector3d normal = plane.head<3>();
-    std::vector<std::string> row = {std::to_string(k), fmt::format("({:7.4f}, {:7.4f}, {:7.4f})", normal.x(), normal.y(), normal.z())};
-    const Match match = best_match(scene.truth.plane_labels, k, result.fit.labels, result.fit.models.size(), seen);
+    std::vector<std::string> row = {std::to_string(k), fmt::format("({:6.3f}, {:6.3f}, {:6.3f})", normal.x(), normal.y(), normal.z())};
+    const Match& match = matches[k];
     if (match.label == 0) {
-      row.insert(row.end(), {"not found", "", "", "", ""});
+      row.insert(row.end(), {"none", "", "", "", ""});
     } else {
       const Model& model = result.fit.models[match.label - 1];
       const double angle = std::acos(std::min(1.0, std::abs(model.normal().dot(normal)))) * 180 / std::numbers::pi;
       const double height = std::abs(model.normal().dot(centre_of(scene.cloud, scene.truth.plane_labels, k, seen)) + model.offset());
-      row.insert(row.end(), {fmt::format("plane {}", match.label), model.supporting ? "yes" : "no", fmt::format("{:.2f} deg", angle),
-                             fmt::format("{:.1f} mm", 1000 * height), fmt::format("{:.1f} %", 100 * match.iou)});
+      row.insert(row.end(), {fmt::format("plane {}", match.label), model.supporting ? "yes" : "no", fmt::format("{:.2f}", angle),
+                             fmt::format("{:.1f}", 1000 * height), fmt::format("{:.1f} %", 100 * match.iou)});
     }
     rows.push_back(std::move(row));
   }
@@ -87,10 +64,11 @@ std::string planes_table(const Scene& scene, const PerceiveResult& result, const
 
 std::string objects_table(const Scene& scene, const PerceiveResult& result, const std::vector<bool>& seen) {
   std::vector<std::vector<std::string>> rows = {{"object", "kind", "pixels", "found as", "outline's overlap", "name"}};
+  const auto matches = match_labels(scene.truth.object_labels, scene.truth.objects, result.objects, result.sois.size(), seen);
   std::size_t found = 0;
   for (std::size_t k = 1; k <= scene.truth.objects; ++k) {
     const auto pixels = std::count(scene.truth.object_labels.begin(), scene.truth.object_labels.end(), k);
-    const Match match = best_match(scene.truth.object_labels, k, result.objects, result.sois.size(), seen);
+    const Match& match = matches[k];
     found += match.iou > 0.5;
     const bool has_kind = k <= scene.truth.object_names.size();
     std::vector<std::string> row = {std::to_string(k), has_kind ? scene.truth.object_names[k - 1] : "", std::to_string(pixels)};
