@@ -1,5 +1,5 @@
 # What the library is made of; tools/setup.sh installs all of it from Debian. swarmfitConfig.cmake.in asks for the same packages.
-set(SWARMFIT_OPENCV_COMPONENTS core imgproc imgcodecs calib3d features2d flann)
+set(SWARMFIT_OPENCV_COMPONENTS core imgproc imgcodecs calib3d features2d flann video)
 
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)

@@ -11,6 +11,7 @@
 
 #include <swarmfit/cloud.hpp>
 
+#include "host/io/rectify.hpp"
 #include "host/io/stereo.hpp"
 #include "tests/io_files.hpp"
 
@@ -76,6 +77,66 @@ TEST(Stereo, ASlantedPlane) {
   EXPECT_LT(std::abs(e.median), 0.1);
 }
 
+/// A textured floor that both cameras see; the right image is turned by `turn` [rad] about its middle and `down` pixels lower.
+struct TiltedPair {
+  cv::Mat left, right;
+};
+
+TiltedPair tilted_pair(double turn, double down) {
+  constexpr int kWidth = 320, kHeight = 240;
+  cv::RNG random(9);
+  cv::Mat noise(kHeight + 40, 2 * kWidth, CV_8UC3), texture;
+  random.fill(noise, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(noise, texture, {}, 1.5);
+  cv::Mat left_map(kHeight, kWidth, CV_32FC2), right_map(kHeight, kWidth, CV_32FC2);
+  TiltedPair pair;
+  for (int v = 0; v < kHeight; ++v) {
+    for (int u = 0; u < kWidth; ++u) {
+      const double x = u - 0.5 * kWidth, y = v - 0.5 * kHeight;
+      left_map.at<cv::Vec2f>(v, u) = {static_cast<float>(u - 8 - 0.05 * v + 60), static_cast<float>(v + 20)};
+      right_map.at<cv::Vec2f>(v, u) = {static_cast<float>(u + turn * y + 60), static_cast<float>(v - down - turn * x + 20)};
+    }
+  }
+  cv::remap(texture, pair.left, left_map, cv::Mat(), cv::INTER_CUBIC);
+  cv::remap(texture, pair.right, right_map, cv::Mat(), cv::INTER_CUBIC);
+  return pair;
+}
+
+TEST(Stereo, RowsThatDoNotMeetAreMeasured) {
+  const auto pair = tilted_pair(0.002, 0.4);
+  cv::Mat left, right;
+  cv::cvtColor(pair.left, left, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(pair.right, right, cv::COLOR_BGR2GRAY);
+  const auto shift = io::row_shift(left, right, 32);
+  ASSERT_TRUE(shift);
+  EXPECT_NEAR((*shift)[0], 0.4, 0.03);
+  // Half a width to the side, a tenth of a pixel.
+  EXPECT_NEAR((*shift)[1], 0.002 * 320, 0.2);
+  EXPECT_NEAR((*shift)[2], 0, 0.2);
+}
+
+TEST(Stereo, LevelRowsAreLeftAloneAndOthersBroughtLevel) {
+  const auto straight = tilted_pair(0, 0);
+  EXPECT_EQ(io::level_rows(straight.left, straight.right, 32).data, straight.right.data);
+  const auto tilted = tilted_pair(0.002, 0.4);
+  const cv::Mat level = io::level_rows(tilted.left, tilted.right, 32);
+  cv::Mat grey, left;
+  cv::cvtColor(level, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(tilted.left, left, cv::COLOR_BGR2GRAY);
+  const auto rest = io::row_shift(left, grey, 32);
+  ASSERT_TRUE(rest);
+  EXPECT_NEAR((*rest)[0], 0, 0.03);
+  EXPECT_NEAR((*rest)[1], 0, 0.2);
+  EXPECT_NEAR((*rest)[2], 0, 0.2);
+}
+
+TEST(Stereo, APairWithoutCornersKeepsItsRows) {
+  const cv::Mat blank(100, 160, CV_8UC3, cv::Scalar(90, 90, 90));
+  EXPECT_EQ(io::level_rows(blank, blank, 32).data, blank.data);
+  const cv::Mat tiny(9, 9, CV_8UC3, cv::Scalar(90, 90, 90));
+  EXPECT_EQ(io::level_rows(tiny, tiny, 16).data, tiny.data);
+}
+
 TEST(Stereo, MetresAndIntrinsicsOfTheLeftImage) {
   const tests::TemporaryFolder folder;
   cv::RNG random(5);
@@ -105,7 +166,8 @@ TEST_P(StereoRealData, AgreesWithTheTrueDisparities) {
   const cv::Mat truth = read_pfm(folder / "disp0GT.pfm");
   ASSERT_FALSE(truth.empty());
   const cv::Mat mask = cv::imread((folder / "mask0nocc.png").string(), cv::IMREAD_GRAYSCALE);
-  const cv::Mat d = io::disparity_map(cv::imread((folder / "im0.png").string()), cv::imread((folder / "im1.png").string()), 80);
+  const cv::Mat left = cv::imread((folder / "im0.png").string()), right = cv::imread((folder / "im1.png").string());
+  const cv::Mat d = io::disparity_map(left, io::level_rows(left, right, 80), 80);
   const Errors e = errors(d, truth, mask);
   RecordProperty("density", std::to_string(e.density));
   RecordProperty("bad2", std::to_string(e.bad));

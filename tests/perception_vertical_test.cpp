@@ -63,6 +63,16 @@ TEST(Vertical, PlanesThatShareADirectionOutweighASingleLargerOne) {
   EXPECT_TRUE(vertical->up.isApprox(planes[1].normal()));
 }
 
+TEST(Vertical, TheLargestOfADirectionTellsItThoughASmallerLiesAmidMore) {
+  const auto grid = view();
+  // 6 degrees apart each: within 0.2 rad of the small one lie both others, of the floor only that.
+  const std::vector<Model> planes{plane({0, -0.84, -0.543}, 1.2, 20000), plane({0, -0.777, -0.629}, 0.8, 3000),
+                                  plane({0, -0.706, -0.708}, 1.4, 2000)};
+  const auto vertical = vertical_from_planes(grid, planes, 0.2);
+  ASSERT_TRUE(vertical);
+  EXPECT_TRUE(vertical->up.isApprox(planes[0].normal(), 1e-3));
+}
+
 TEST(Vertical, ACameraFrameWithYUpAndZBackwards) {
   const auto grid = view(-1, -1);
   const auto desk = plane({0, 0.8, 0.6}, 0.5, 1000), wall = plane({0, -0.6, 0.8}, 2, 2500);

@@ -11,6 +11,7 @@
 #include "host/io/file.hpp"
 #include "host/io/grid.hpp"
 #include "host/io/image.hpp"
+#include "host/io/rectify.hpp"
 
 namespace swarmfit {
 namespace io {
@@ -62,7 +63,7 @@ Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::
   if (calib->disparities > left->cols) {
     return bad_input(calib_file, "field ndisp: {}, must be at most the image's width {}", calib->disparities, left->cols);
   }
-  const cv::Mat d = disparity_map(*left, *right, calib->disparities);
+  const cv::Mat d = disparity_map(*left, level_rows(*left, *right, calib->disparities), calib->disparities);
   cv::Mat z(d.size(), CV_32F);
   const double bf = calib->baseline * calib->left.fx;
   for (int v = 0; v < z.rows; ++v) {

@@ -67,18 +67,22 @@ std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<co
     normals.push_back(facing(grid, plane));
     weights.push_back(static_cast<double>(plane.inliers) * plausibility(normals.back(), axes));
   }
-  std::size_t best = 0;
+  const auto alike = [&](std::size_t i, std::size_t j) { return std::abs(normals[i].dot(normals[j])) > std::cos(horizontal_angle); };
+  std::size_t centre = 0;
   double most = -1;
   for (std::size_t i = 0; i < normals.size(); ++i) {
     double shared = 0;
     for (std::size_t j = 0; j < normals.size(); ++j)
-      if (std::abs(normals[i].dot(normals[j])) > std::cos(horizontal_angle)) shared += weights[j];
-    // Of the planes of one direction, the largest tells it best.
-    if (shared > most || (shared == most && weights[i] > weights[best])) {
+      if (alike(i, j)) shared += weights[j];
+    if (shared > most) {
       most = shared;
-      best = i;
+      centre = i;
     }
   }
+  // Of the planes of one direction, the largest tells it best; a small one amid them has most of them about it.
+  std::size_t best = centre;
+  for (std::size_t j = 0; j < normals.size(); ++j)
+    if (alike(centre, j) && weights[j] > weights[best]) best = j;
   const Eigen::Vector3d normal = normals[best];
   if (axes && std::abs(normal.dot(axes->down)) < kRises) {
     const bool sideways = std::abs(normal.dot(axes->right)) >= kLeans;
