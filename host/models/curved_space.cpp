@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace swarmfit::models {
 namespace {
@@ -18,37 +17,6 @@ double CurvedSpace::distance(const Position& a, const Position& b) const {
   Position v(parameter_count());
   difference(a, b, v);
   return v.norm();
-}
-
-CurvedSpace::Equations CurvedSpace::equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
-  const int c = components(), f = freedom();
-  Equations sum{Normal::Zero(f, f), Chart::Zero(f), 0, 0};
-  const Basis chart = basis(theta);
-  Linear at;
-  Eigen::Matrix<double, kMostComponents, Eigen::Dynamic, 0, kMostComponents, kMostFreedom> row(kMostComponents, f);
-  for (std::size_t k = 0; k < support.index.size(); ++k) {
-    if (!linearise(points, support.index[k], theta, at)) continue;
-    const double w = support.weight[k];
-    row.topRows(c).noalias() = at.by_parameter.topLeftCorner(c, parameter_count()) * chart;
-    for (int i = 0; i < c; ++i) {
-      sum.information.template selfadjointView<Eigen::Lower>().rankUpdate(row.row(i).transpose(), w);
-      sum.gradient.noalias() += (w * at.residual[i]) * row.row(i).transpose();
-      sum.squares += w * at.residual[i] * at.residual[i];
-    }
-    ++sum.used;
-  }
-  sum.information.template triangularView<Eigen::StrictlyUpper>() = sum.information.transpose();
-  return sum;
-}
-
-double CurvedSpace::squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
-  double sum = 0;
-  Linear at;
-  for (std::size_t k = 0; k < support.index.size(); ++k) {
-    if (!linearise(points, support.index[k], theta, at)) return std::numeric_limits<double>::infinity();
-    for (int i = 0; i < components(); ++i) sum += support.weight[k] * at.residual[i] * at.residual[i];
-  }
-  return sum;
 }
 
 bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, Position& theta) const {

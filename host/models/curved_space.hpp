@@ -1,7 +1,7 @@
 // What the kinds without a closed least-squares form share: Gauss-Newton steps on a local chart, and the covariance that comes with it.
 #pragma once
 
-#include <array>
+#include <limits>
 
 #include <Eigen/Dense>
 
@@ -9,18 +9,12 @@
 
 namespace swarmfit::models {
 
-/// A kind whose residual is linearised around a position. Chart: `freedom()` numbers near 0, the position itself being 0.
+/// A kind whose residual is linearised around a position, as `Linearised` does. Chart: `freedom()` numbers near 0, the position itself being 0.
 class CurvedSpace : public ModelSpace {
  public:
-  static constexpr int kMostComponents = 2;
   static constexpr int kMostFreedom = 8;
   static constexpr int kMostParameters = 9;
 
-  /// Residual components of one point, whitened: under equal independent noise in every column each has that noise's deviation.
-  struct Linear {
-    Eigen::Matrix<double, kMostComponents, 1> residual;
-    Eigen::Matrix<double, kMostComponents, kMostParameters> by_parameter;  ///< derivative by the position's entries
-  };
   using Basis = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostParameters, kMostFreedom>;
 
   double distance(const Position& a, const Position& b) const override;
@@ -31,25 +25,76 @@ class CurvedSpace : public ModelSpace {
 
  protected:
   /// Independent residual components of a point: 1 for a surface, 2 where a point must land on a point.
-  virtual int components() const noexcept { return 1; }
-  /// False where the residual is not defined at this point, which then has no say.
-  virtual bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const = 0;
+  virtual int components() const noexcept = 0;
   /// Derivative of the position's entries by the chart, parameter_count() x freedom().
   virtual Basis basis(const Position& theta) const = 0;
   /// The position at `step` of the chart around theta.
   virtual Position retract(const Position& theta, const Position& step) const = 0;
 
- private:
   using Normal = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostFreedom, kMostFreedom>;
-  using Chart = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFreedom, 1>;
+  using Gradient = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostFreedom, 1>;
   struct Equations {
-    Normal information;  ///< J^T W J
-    Chart gradient;      ///< J^T W r
+    Normal information;  ///< J^T W J over the chart
+    Gradient gradient;   ///< J^T W r
     double squares = 0;  ///< r^T W r
     std::size_t used = 0;
   };
-  Equations equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const;
-  double squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const;
+  virtual Equations equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+  /// r^T W r; infinite where the residual is not defined at a point.
+  virtual double squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+};
+
+/// The sums of a kind whose sizes are known at compile time: they run over every point of the support at each step, and are most of what a
+/// refinement takes. `Kind` has `bool linearise(points, point, theta, Linear&) const`, false where the residual is not defined at this
+/// point, which then has no say.
+template <class Kind, class Base, int Components, int Parameters>
+class Linearised : public Base {
+ protected:
+  using Row = Eigen::Matrix<double, 1, Parameters>;
+  /// Residual components of one point, whitened: under equal independent noise in every column each has that noise's deviation.
+  struct Linear {
+    Eigen::Matrix<double, Components, 1> residual;
+    Eigen::Matrix<double, Components, Parameters, Components == 1 ? Eigen::RowMajor : Eigen::ColMajor>
+        by_parameter;  ///< derivative by the position's entries
+  };
+
+  int components() const noexcept override { return Components; }
+
+  typename Base::Equations equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+    Eigen::Matrix<double, Parameters, Parameters> information = Eigen::Matrix<double, Parameters, Parameters>::Zero();
+    Eigen::Matrix<double, Parameters, 1> gradient = Eigen::Matrix<double, Parameters, 1>::Zero();
+    typename Base::Equations sum;
+    Linear at;
+    at.by_parameter.setZero();
+    for (std::size_t k = 0; k < support.index.size(); ++k) {
+      if (!itself().linearise(points, support.index[k], theta, at)) continue;
+      const double w = support.weight[k];
+      for (int i = 0; i < Components; ++i) {
+        const Row row = at.by_parameter.row(i);
+        for (int c = 0; c < Parameters; ++c) information.col(c) += (w * row[c]) * row.transpose();
+        gradient += (w * at.residual[i]) * row.transpose();
+        sum.squares += w * at.residual[i] * at.residual[i];
+      }
+      ++sum.used;
+    }
+    const typename Base::Basis chart = this->basis(theta);
+    sum.information = chart.transpose() * information * chart;
+    sum.gradient = chart.transpose() * gradient;
+    return sum;
+  }
+
+  double squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+    double sum = 0;
+    Linear at;
+    for (std::size_t k = 0; k < support.index.size(); ++k) {
+      if (!itself().linearise(points, support.index[k], theta, at)) return std::numeric_limits<double>::infinity();
+      sum += support.weight[k] * at.residual.squaredNorm();
+    }
+    return sum;
+  }
+
+ private:
+  const Kind& itself() const noexcept { return static_cast<const Kind&>(*this); }
 };
 
 }  // namespace swarmfit::models

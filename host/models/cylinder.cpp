@@ -12,7 +12,7 @@ constexpr double kLargest = 2;
 constexpr double kLeastTurn = 0.1;
 
 /// Position: a point of the axis (the one nearest the origin), its direction, the radius.
-class Cylinder final : public CurvedSpace {
+class Cylinder final : public Linearised<Cylinder, CurvedSpace, 1, 7> {
  public:
   using Vector = Eigen::Vector3d;
 
@@ -96,8 +96,7 @@ class Cylinder final : public CurvedSpace {
     return true;
   }
 
- protected:
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const override {
+  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
     const Vector axis = theta.segment<3>(3), arm = points.point<3>(point) - theta.head<3>();
     const double along = axis.dot(arm);
     const Vector across = arm - along * axis;
@@ -111,6 +110,7 @@ class Cylinder final : public CurvedSpace {
     return true;
   }
 
+ protected:
   /// The point moves across the axis, the axis in its tangent plane.
   Basis basis(const Position& theta) const override {
     const auto [u, v] = tangents(theta);

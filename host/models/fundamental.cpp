@@ -37,7 +37,7 @@ int real_roots(const std::array<double, 4>& c, std::array<double, 3>& roots) {
   return 1;
 }
 
-class Fundamental final : public Projective {
+class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
  public:
   ModelType type() const noexcept override { return ModelType::fundamental; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::fundamental; }
@@ -101,11 +101,10 @@ class Fundamental final : public Projective {
     return true;
   }
 
- protected:
   /// Sampson's error.
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const override {
+  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
     const Eigen::Vector4d p = points.point<4>(point);
-    const Matrix m = matrix(theta);
+    const Eigen::Map<const Matrix> m(theta.data());
     const Eigen::Vector3d x = first(p), y = second(p), right = m * x, left = m.transpose() * y;
     const double gradient = std::sqrt(right.head<2>().squaredNorm() + left.head<2>().squaredNorm());
     if (!(gradient > 1e-15)) return false;
@@ -118,6 +117,7 @@ class Fundamental final : public Projective {
     return std::isfinite(e);
   }
 
+ protected:
   /// Of U diag(cos a, sin a, 0) V^T by small rotations of U and V and by a: seven numbers, rank 2 throughout.
   Basis basis(const Position& theta) const override {
     const Svd svd(matrix(theta), Eigen::ComputeFullU | Eigen::ComputeFullV);

@@ -20,7 +20,7 @@ bool from_basis(const Eigen::Matrix<double, 3, 4>& p, Eigen::Matrix3d& a) {
   return true;
 }
 
-class Homography final : public Projective {
+class Homography final : public Linearised<Homography, Projective, 2, 9> {
  public:
   ModelType type() const noexcept override { return ModelType::homography; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::homography; }
@@ -59,30 +59,30 @@ class Homography final : public Projective {
     return true;
   }
 
- protected:
-  int components() const noexcept override { return 2; }
-
   /// Sampson's error: c(x, H) = (u - x', v - y') with (u, v) = H x, divided by the root of its covariance under unit noise in all columns.
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const override {
+  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
     const Eigen::Vector4d p = points.point<4>(point);
-    const Matrix m = matrix(theta);
-    const Eigen::Vector3d x = first(p), y = m * x;
-    if (!(std::abs(y[2]) > 1e-12)) return false;
-    const Eigen::Vector2d image(y[0] / y[2], y[1] / y[2]);
-    Eigen::Matrix2d along;  // of the image by the point
-    along << m(0, 0) - image[0] * m(2, 0), m(0, 1) - image[0] * m(2, 1), m(1, 0) - image[1] * m(2, 0), m(1, 1) - image[1] * m(2, 1);
-    along /= y[2];
-    const Eigen::Matrix2d covariance = along * along.transpose() + Eigen::Matrix2d::Identity();
-    const Eigen::LLT<Eigen::Matrix2d> root(covariance);
-    at.residual = root.matrixL().solve(Eigen::Vector2d(image - p.tail<2>()));
-    Eigen::Matrix<double, 2, 9> by;
-    by << x.transpose(), Eigen::RowVector3d::Zero(), -image[0] * x.transpose(),  //
-        Eigen::RowVector3d::Zero(), x.transpose(), -image[1] * x.transpose();
-    by /= y[2];
-    at.by_parameter = root.matrixL().solve(by);
-    return at.residual.allFinite();
+    const Eigen::Map<const Matrix> m(theta.data());
+    const Eigen::Vector3d x = first(p);
+    const double depth = m.row(2).dot(x);
+    if (!(std::abs(depth) > 1e-12)) return false;
+    const double scale = 1 / depth, u = scale * m.row(0).dot(x), v = scale * m.row(1).dot(x);
+    // Of the image by the point, along * along^T + I; and its root, lower triangular.
+    const double a = scale * (m(0, 0) - u * m(2, 0)), b = scale * (m(0, 1) - u * m(2, 1));
+    const double c = scale * (m(1, 0) - v * m(2, 0)), d = scale * (m(1, 1) - v * m(2, 1));
+    const double first_root = std::sqrt(1 + a * a + b * b), mixed = (a * c + b * d) / first_root;
+    const double second_root = std::sqrt(1 + c * c + d * d - mixed * mixed);
+    const double one = 1 / first_root, other = 1 / second_root;
+    at.residual[0] = one * (u - p[2]);
+    at.residual[1] = other * (v - p[3] - mixed * at.residual[0]);
+    const Eigen::RowVector3d by_first = (one * scale) * x.transpose(), by_second = (other * scale) * x.transpose();
+    const Eigen::RowVector3d share = (other * mixed) * by_first;
+    at.by_parameter.row(0) << by_first, Eigen::RowVector3d::Zero(), -u * by_first;
+    at.by_parameter.row(1) << -share, by_second, u * share - v * by_second;
+    return std::isfinite(at.residual[0]) && std::isfinite(at.residual[1]);
   }
 
+ protected:
   /// The tangent space of the unit sphere: what the Householder reflection that takes theta to an axis leaves.
   Basis basis(const Position& theta) const override {
     Vector9 u = theta;

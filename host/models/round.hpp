@@ -8,9 +8,11 @@
 namespace swarmfit::models {
 
 template <int D>
-class Round : public CurvedSpace {
+class Round : public Linearised<Round<D>, CurvedSpace, 1, D + 1> {
  public:
   using Vector = Eigen::Matrix<double, D, 1>;
+  using Basis = CurvedSpace::Basis;
+  using Linear = typename Linearised<Round<D>, CurvedSpace, 1, D + 1>::Linear;
 
   int minimal_sample() const noexcept override { return D + 1; }
   int least_rank() const noexcept override { return D; }
@@ -54,8 +56,7 @@ class Round : public CurvedSpace {
 
   bool admit(Position& theta) const override { return theta.allFinite() && theta[D] > 0 && theta[D] < kLargest; }
 
- protected:
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const override {
+  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
     const Vector arm = points.template point<D>(point) - theta.template head<D>();
     const double length = arm.norm();
     if (!(length > 0)) return false;
@@ -64,6 +65,8 @@ class Round : public CurvedSpace {
     at.by_parameter(0, D) = -1;
     return true;
   }
+
+ protected:
   Basis basis(const Position&) const override { return Basis::Identity(D + 1, D + 1); }
   Position retract(const Position& theta, const Position& step) const override { return theta + step; }
 
