@@ -41,6 +41,8 @@ class ModelSpace {
   virtual int least_rank() const noexcept = 0;
   /// Whether from_sample looks at the points' normals.
   virtual bool needs_normals() const noexcept { return false; }
+  /// Whether from_sample takes so long, a microsecond or more, that a swarm's samples are worth spreading over threads.
+  virtual bool costly_samples() const noexcept { return false; }
   /// Degrees of freedom: rank of the covariance.
   virtual int freedom() const noexcept = 0;
 

@@ -14,6 +14,7 @@ class Projective : public CurvedSpace {
   using Vector9 = Eigen::Matrix<double, 9, 1>;
 
   int least_rank() const noexcept override { return 2; }
+  bool costly_samples() const noexcept override { return true; }
   int parameter_count() const noexcept override { return 9; }
 
   /// Along the great circle of the unit sphere in 9 dimensions, to whichever of M and -M is nearer.

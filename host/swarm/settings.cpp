@@ -137,6 +137,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
+  s.threads = options.threads;
   s.threshold = threshold;
   s = for_kind(s, options.model);
   const std::size_t fitted = s.fit_points > 0 ? std::min(s.fit_points, finite_points) : finite_points;

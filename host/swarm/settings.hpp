@@ -39,6 +39,7 @@ struct Settings {
   double lambda = 10;          ///< Eq. (5)
   double dead_zone_slope = 2;  ///< kappa of residual deflation: how fast caps rise beyond the dead zone
   Loss loss = Loss::truncated_l1;
+  int threads = 0;              ///< that move a swarm whose samples take long; 0: as many as the machine has
   int patience = 2;             ///< swarms in a row whose best does not pay before the fit ends
   bool refine = true;           ///< least squares on the inliers of what converged
   bool joint = true;            ///< refine all models together at the end

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/common/parallel.hpp"
+
 namespace swarmfit::swarm {
 
 double constriction(double c1, double c2) {
@@ -41,17 +43,18 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   list_.clear();
   const std::size_t m = positions_.size();
   const auto local = static_cast<std::size_t>(settings_.local_share * static_cast<double>(m));
-  std::size_t sampled = 0;
-  for (std::size_t j = 0; j < m; ++j) {
+  std::vector<std::uint8_t> placed(m, 1);
+  for_particles([&](std::size_t j) {
     if (j < seeds.size()) {
       positions_[j] = seeds[j];
-      ++sampled;
-    } else if (sampler.draw(j % m < local, round, 0, static_cast<std::uint32_t>(j), positions_[j])) {
-      ++sampled;
     } else {
-      positions_[j] = sampled > 0 ? positions_[j - 1] : models::Position();
+      placed[j] = sampler.draw(j % m < local, round, 0, static_cast<std::uint32_t>(j), positions_[j]) ? 1 : 0;
     }
-    if (sampled == 0) return false;
+  });
+  // Data that yield no sample at first hardly yield one later.
+  if (placed[0] == 0) return false;
+  for (std::size_t j = 1; j < m; ++j) {
+    if (placed[j] == 0) positions_[j] = positions_[j - 1];
   }
   const auto width = space_.parameter_count();
   for (std::size_t j = 0; j < m; ++j) {
@@ -117,39 +120,60 @@ const models::Position& Swarm::attractor(std::size_t particle) const {
   return own_best_[best];
 }
 
+void Swarm::for_particles(const std::function<void(std::size_t)>& body) const {
+  constexpr int kAtOnce = 8;
+  const auto range = [&](int first, int last) {
+    for (int j = first; j < last; ++j) body(static_cast<std::size_t>(j));
+  };
+  const auto count = static_cast<int>(positions_.size());
+  if (space_.costly_samples()) {
+    common::in_parallel(count, kAtOnce, settings_.threads, range);
+  } else {
+    range(0, count);
+  }
+}
+
 void Swarm::move(const Sampler& sampler) {
-  const auto width = static_cast<std::size_t>(space_.parameter_count());
-  const auto steps = static_cast<std::uint32_t>(steps_);
-  models::Position to_own(static_cast<Eigen::Index>(width)), to_best(static_cast<Eigen::Index>(width));
-  models::Position before;
-  const auto renewed = static_cast<std::size_t>(settings_.renewal_share * static_cast<double>(positions_.size()));
+  // A particle looks at its neighbours' bests, so none may change while others move.
   for (std::size_t j = 0; j < positions_.size(); ++j) {
-    const auto particle = static_cast<std::uint32_t>(j);
     if (own_best_[j].size() == 0) own_best_[j] = positions_[j];
-    // The renewed places rotate through the ring, so that every neighbourhood is refreshed in turn.
-    if (renewed > 0 && (j + static_cast<std::size_t>(steps_) * renewed) % positions_.size() < renewed) {
-      if (sampler.draw((j & 1U) != 0 && settings_.local_share > 0, round_, steps, particle, positions_[j])) {
-        velocities_[j].setZero();
-        continue;
-      }
+  }
+  for_particles([&](std::size_t j) {
+    if (!renew(sampler, j)) fly(j);
+  });
+}
+
+bool Swarm::renew(const Sampler& sampler, std::size_t j) {
+  const std::size_t m = positions_.size();
+  const auto renewed = static_cast<std::size_t>(settings_.renewal_share * static_cast<double>(m));
+  // The renewed places rotate through the ring, so that every neighbourhood is refreshed in turn.
+  if (renewed == 0 || (j + static_cast<std::size_t>(steps_) * renewed) % m >= renewed) return false;
+  const bool local = (j & 1U) != 0 && settings_.local_share > 0;
+  if (!sampler.draw(local, round_, static_cast<std::uint32_t>(steps_), static_cast<std::uint32_t>(j), positions_[j])) return false;
+  velocities_[j].setZero();
+  return true;
+}
+
+void Swarm::fly(std::size_t j) {
+  const auto width = static_cast<std::size_t>(space_.parameter_count());
+  const auto particle = static_cast<std::uint32_t>(j), steps = static_cast<std::uint32_t>(steps_);
+  models::Position to_own(static_cast<Eigen::Index>(width)), to_best(static_cast<Eigen::Index>(width));
+  space_.difference(positions_[j], own_best_[j], to_own);
+  space_.difference(positions_[j], attractor(j), to_best);
+  for (std::size_t d = 0; d < width; d += 2) {
+    const auto words = random_.words(Draw::move, round_, steps, particle * 16 + static_cast<std::uint32_t>(d / 2));
+    for (std::size_t e = d; e < std::min(d + 2, width); ++e) {
+      const auto at = static_cast<Eigen::Index>(e);
+      const double r1 = Random::unit(words[2 * (e - d)]), r2 = Random::unit(words[2 * (e - d) + 1]);
+      velocities_[j][at] = chi_ * (settings_.inertia * velocities_[j][at] + settings_.cognitive * r1 * to_own[at] +
+                                   settings_.social * r2 * to_best[at]);  // Eq. (1)
     }
-    space_.difference(positions_[j], own_best_[j], to_own);
-    space_.difference(positions_[j], attractor(j), to_best);
-    for (std::size_t d = 0; d < width; d += 2) {
-      const auto words = random_.words(Draw::move, round_, steps, particle * 16 + static_cast<std::uint32_t>(d / 2));
-      for (std::size_t e = d; e < std::min(d + 2, width); ++e) {
-        const auto at = static_cast<Eigen::Index>(e);
-        const double r1 = Random::unit(words[2 * (e - d)]), r2 = Random::unit(words[2 * (e - d) + 1]);
-        velocities_[j][at] = chi_ * (settings_.inertia * velocities_[j][at] + settings_.cognitive * r1 * to_own[at] +
-                                     settings_.social * r2 * to_best[at]);  // Eq. (1)
-      }
-    }
-    before = positions_[j];
-    space_.move(positions_[j], velocities_[j]);
-    if (!space_.admit(positions_[j])) {
-      positions_[j] = before;
-      velocities_[j].setZero();
-    }
+  }
+  const models::Position before = positions_[j];
+  space_.move(positions_[j], velocities_[j]);
+  if (!space_.admit(positions_[j])) {
+    positions_[j] = before;
+    velocities_[j].setZero();
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -48,6 +49,11 @@ class Swarm {
  private:
   void remember();
   void move(const Sampler& sampler);
+  /// Puts a particle whose turn it is at a new sample; false where it is not, or the data yield none.
+  bool renew(const Sampler& sampler, std::size_t particle);
+  void fly(std::size_t particle);
+  /// Side by side where a kind's samples take long; what the body does with one particle must not matter to another.
+  void for_particles(const std::function<void(std::size_t)>& body) const;
   const models::Position& attractor(std::size_t particle) const;
 
   const models::ModelSpace& space_;
