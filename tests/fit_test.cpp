@@ -269,6 +269,54 @@ TEST(Fit, Line2dEstimatesItsThreshold) {
   EXPECT_NEAR(std::abs(result->models[0].parameters[1]), 1, 1e-3);
 }
 
+/// Five chords of a circle that cross each other, Gaussian noise 0.0075, among as many outliers; `noise` [data unit].
+std::vector<double> star(double noise) {
+  std::mt19937_64 engine(12);
+  std::normal_distribution<double> normal(0, noise);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<double> rows;
+  for (int line = 0; line < 5; ++line) {
+    const double one = 1.2566 * line, other = one + 2.5133;
+    for (int k = 0; k < 50; ++k) {
+      const double t = unit(engine);
+      rows.push_back(0.5 + 0.45 * ((1 - t) * std::cos(one) + t * std::cos(other)) + normal(engine));
+      rows.push_back(0.5 + 0.45 * ((1 - t) * std::sin(one) + t * std::sin(other)) + normal(engine));
+    }
+  }
+  for (int k = 0; k < 250; ++k) rows.insert(rows.end(), {unit(engine), unit(engine)});
+  return rows;
+}
+
+TEST(Fit, LinesThatCrossTellTheirNoiseWhateverTheSeed) {
+  const auto rows = star(0.0075);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    FitOptions options;
+    options.model = ModelType::line2d;
+    options.seed = seed;
+    std::size_t told = 0;
+    const auto result = fit(PointsView(std::span<const double>(rows), 2), options, [&](const Model&) {
+      ++told;
+      return Verdict::go_on;
+    });
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_EQ(result->models.size(), 5U) << seed;
+    EXPECT_EQ(told, 5U) << "those that told the noise are announced as well";
+    EXPECT_NEAR(result->threshold, 2.5 * 0.0075, 0.15 * 2.5 * 0.0075) << seed;
+    for (const Model& model : result->models) EXPECT_GT(model.iterations, 0U);
+  }
+}
+
+TEST(Fit, MaxModelsHoldsForThoseThatToldTheNoise) {
+  const auto rows = star(0.0075);
+  FitOptions options;
+  options.model = ModelType::line2d;
+  options.max_models = 2;
+  const auto result = fit(PointsView(std::span<const double>(rows), 2), options);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->models.size(), 2U);
+  EXPECT_EQ(result->stop_reason, "max-models reached");
+}
+
 struct BadPoints {
   const char* name;
   std::vector<float> rows;

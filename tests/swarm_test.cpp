@@ -254,6 +254,15 @@ TEST(Payment, AModelOfTheBackgroundsDensityDoesNotPay) {
   EXPECT_LT(log_false_alarms(support(150, 100, 1000), 2), log_false_alarms(support(120, 100, 1000), 2));
 }
 
+TEST(Payment, AGapOnEitherSideFlattersNobody) {
+  Settings settings;
+  settings.min_inliers = 10;
+  Support chance = support(30, 12, 270);  // among some 10 a slab, beside slabs that happen to be thin
+  EXPECT_TRUE(pays(chance, settings, 2));
+  for (std::size_t k = 3; k < Support::kSlabs; ++k) chance.slabs[k] = 10;
+  EXPECT_FALSE(pays(chance, settings, 2));
+}
+
 TEST(Payment, TwoSurfacesSideBySidePayUnlessOneIsTheOthersLayer) {
   Settings settings;
   settings.min_inliers = 10;

@@ -176,17 +176,20 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 
   FitResult result;
+  std::vector<swarm::Known> known;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
   if (options.estimate_threshold || !given) {
     auto estimated = swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options);
     if (!estimated) return tl::unexpected(estimated.error());
-    result.threshold = *estimated;
+    result.threshold = estimated->threshold;
+    // The preset of the paper finds each model by a search of its own.
+    if (options.preset == Preset::fast) known = std::move(estimated->models);
   } else {
     result.threshold = *given;
   }
   swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
   swarm::MultiModel search(evaluator, kinds, working, part, options.seed, limits);
-  if (auto done = search.run(on_model, warm_start, result); !done) return tl::unexpected(done.error());
+  if (auto done = search.run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
   std::vector<models::Placed> found = search.found();
   const swarm::Ground ground{evaluator, *kinds.front().space, *whole, static_cast<float>(result.threshold)};
   if (thin_rows) {

@@ -18,6 +18,13 @@ struct Kind {
   bool hidden = false;  ///< not asked for; it only takes what is flat from the curved ones
 };
 
+/// A model that a search is given to begin with.
+struct Known {
+  std::size_t kind = 0;        ///< among those asked for
+  models::Position theta;      ///< in the frame of the points
+  std::size_t iterations = 0;  ///< that it took to find
+};
+
 /// Those asked for, in that order, and behind them the flat one that curved kinds are held against, where that was not asked for.
 std::vector<Kind> make_kinds(const FitOptions& options);
 /// Fills their settings in; as resolve() of one.

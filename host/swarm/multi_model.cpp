@@ -64,7 +64,35 @@ void MultiModel::count_effort(FitResult& result) const {
   result.points_touched = whole > 0 ? static_cast<double>(effort.touched) / whole : 1.0;
 }
 
-Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result) {
+Expected<> MultiModel::take(const Candidate& candidate, Outcome outcome, const ModelCallback& on_model, FitResult& result) {
+  const bool kept = outcome == Outcome::found;
+  auto go_on = kept ? accept(candidate, on_model, result) : Expected<bool>(true);
+  if (!go_on) return tl::unexpected(go_on.error());
+  if (!kept) hidden_.push_back({&space(candidate.kind), candidate.theta});
+  if (auto done = deflate(candidate); !done) return done;
+  if (!*go_on) stop_reason_ = "stopped by the caller";
+  return {};
+}
+
+Expected<> MultiModel::adopt(const Known& known, const ModelCallback& on_model, FitResult& result) {
+  Candidate candidate;
+  candidate.kind = known.kind;
+  candidate.theta = known.theta;
+  steps_ = known.iterations;
+  if (auto done = refine(candidate); !done) return done;
+  if (!pays(candidate.support, kinds_[known.kind].settings, space(known.kind).minimal_sample())) return {};
+  Outcome outcome = Outcome::found;
+  if (kinds_.size() > 1) {
+    auto contested = contest(candidate);
+    if (!contested) return tl::unexpected(contested.error());
+    outcome = *contested;
+  }
+  if (outcome != Outcome::found && outcome != Outcome::flat) return {};
+  return take(candidate, outcome, on_model, result);
+}
+
+Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
+                           std::span<const Known> known) {
   if (auto done = evaluator_.set_points(searched().view()); !done) return tl::unexpected(to_error(done.error()));
   if (auto done = show(caps_); !done) return done;
   Seeds seeds(kinds_.size());
@@ -74,6 +102,10 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
       models::Position theta = space(kind).from_data(model.parameters, points_.frame());
       if (space(kind).admit(theta)) seeds[kind].push_back(std::move(theta));
     }
+  }
+  for (const Known& model : known) {
+    if (!stop_reason_.empty() || interrupted() || (limits_.max_models > 0 && found_.size() >= limits_.max_models)) break;
+    if (auto done = adopt(model, on_model, result); !done) return done;
   }
   int unpaid = 0;
   while (stop_reason_.empty()) {
@@ -87,12 +119,7 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     if (*outcome == Outcome::interrupted) break;
     if (*outcome == Outcome::found || *outcome == Outcome::flat) {
       unpaid = 0;
-      const bool kept = *outcome == Outcome::found;
-      auto go_on = kept ? accept(best, on_model, result) : Expected<bool>(true);
-      if (!go_on) return tl::unexpected(go_on.error());
-      if (!kept) hidden_.push_back({&space(best.kind), best.theta});
-      if (auto done = deflate(best); !done) return tl::unexpected(done.error());
-      if (!*go_on) stop_reason_ = "stopped by the caller";
+      if (auto done = take(best, *outcome, on_model, result); !done) return done;
       continue;
     }
     if (settings_.deflation == Deflation::parametric) landscapes_[best.kind].deflate_around(best.theta);
@@ -314,7 +341,7 @@ Expected<> MultiModel::polish() {
     return {};
   };
   if (auto done = refine_all(ground_.corner, full_rounds()); !done) return done;
-  if (part_searched_ || settings_.loss != Loss::truncated_l1 || shares_out()) return {};
+  if (!settings_.sharpen || part_searched_ || settings_.loss != Loss::truncated_l1 || shares_out()) return {};
   // Few points leave the least absolute deviations well apart from what rounded corners make of them.
   for (const float corner : kSharper) {
     if (auto done = refine_all(corner, kMostRounds); !done) return done;

@@ -40,8 +40,9 @@ class MultiModel {
   MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points, const Part& part,
              std::uint64_t seed, Limits limits);
 
-  /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle().
-  Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result);
+  /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
+  /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.
+  Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result, std::span<const Known> known = {});
   /// The result's models in the frame of the points.
   const std::vector<models::Placed>& found() const noexcept { return found_; }
   /// Flat models that curved ones were taken for; not in the result.
@@ -72,6 +73,10 @@ class MultiModel {
   /// least `alive`.
   Expected<bool> fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
                      std::span<const float> caps, float alive);
+  /// Takes a model without a search, if it pays.
+  Expected<> adopt(const Known& known, const ModelCallback& on_model, FitResult& result);
+  /// What follows once a search has come to a model, be it a hidden one.
+  Expected<> take(const Candidate& candidate, Outcome outcome, const ModelCallback& on_model, FitResult& result);
   Expected<> refine(Candidate& candidate);
   Expected<bool> accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate(const Candidate& candidate);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
@@ -14,6 +15,8 @@ constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
 constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
 constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
 constexpr double kSettled = 0.05;   // relative change of the threshold below which it stays
+constexpr double kAlike = 0.25;     // one below which a search would find the same models
+constexpr int kFreeSteps = 2;       // of the threshold; further ones go half the way, for it may swing between two models' noise
 constexpr int kRounds = 10;         // of search
 constexpr int kSteps = 10;          // of models and threshold in turn, after each
 constexpr std::size_t kModels = 4;  // the most prominent ones tell the scale
@@ -49,39 +52,42 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
 
 namespace {
 
-/// Sigma as the models see it that the points within `tau` of them show: the weighted median, each model voting with what it holds. 0 without
-/// models.
-Expected<double> common_sigma(const Ground& ground, std::span<const models::Placed> models, std::vector<float>& distances) {
-  std::vector<std::pair<double, std::size_t>> votes;
-  std::size_t total = 0;
+/// Sigma that the points within reach of the models show, each of its nearest one.
+Expected<double> common_sigma(const Ground& ground, std::span<const models::Placed> models, std::vector<float>& distances,
+                              std::vector<float>& nearest) {
+  std::fill(nearest.begin(), nearest.end(), std::numeric_limits<float>::infinity());
   for (const auto& [space, theta] : models) {
-    const auto evidence = weigh(ground.of(*space), theta, {}, distances);
-    if (!evidence) return tl::unexpected(evidence.error());
-    const auto tau = static_cast<double>(ground.tau);
-    votes.emplace_back(gaussian_part(distances, tau / kSigmas, 2 * tau), static_cast<std::size_t>(evidence->count));
-    total += votes.back().second;
+    if (auto done = weigh(ground.of(*space), theta, {}, distances); !done) return tl::unexpected(done.error());
+    take_nearer(distances, nearest);
   }
-  std::sort(votes.begin(), votes.end());
-  std::size_t below = 0;
-  for (const auto& [value, weight] : votes) {
-    below += weight;
-    if (2 * below >= total) return value;
-  }
-  return 0.0;
+  const auto tau = static_cast<double>(ground.tau);
+  return gaussian_part(nearest, tau / kSigmas, 2 * tau);
 }
 
-bool near(double a, double b) { return std::abs(a - b) <= kSettled * b; }
+std::vector<Known> as_known(std::vector<models::Placed>& found, std::span<const Kind> kinds, const FitResult& result) {
+  std::vector<Known> known;
+  for (std::size_t m = 0; m < found.size(); ++m) {
+    const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& k) { return k.space.get() == found[m].space; });
+    known.push_back({static_cast<std::size_t>(kind - kinds.begin()), std::move(found[m].theta), result.models[m].iterations});
+  }
+  return known;
+}
+
+bool near(double a, double b, double share) { return std::abs(a - b) <= share * b; }
 
 }  // namespace
 
-Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
-                                    std::size_t finite_points, const FitOptions& options) {
+Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
+                                        std::size_t finite_points, const FitOptions& options) {
   std::vector<Kind> kinds = make_kinds(options);
+  std::erase_if(kinds, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
   const double unit = points.frame().scale;
   double tau = kGenerous * unit;
-  std::vector<float> distances(points.size()), caps(points.size());
+  std::vector<Known> known;
+  std::vector<float> distances(points.size()), nearest(points.size()), caps(points.size());
   for (int round = 0; round < kRounds; ++round) {
     resolve(kinds, options, finite_points, tau);
+    for (Kind& kind : kinds) kind.settings.sharpen = false;  // what follows fits the models anew
     const Settings& settings = kinds.front().settings;
     Limits limits;
     limits.max_models = kModels;
@@ -103,16 +109,17 @@ Expected<double> estimate_threshold(kernels::FitnessEvaluator& evaluator, const 
           if (auto done = refine_one(ground.of(*space), settings.loss, caps, theta); !done) return tl::unexpected(done.error());
         }
       }
-      const auto sigma = common_sigma(ground, found, distances);
-      if (!sigma) return sigma;
+      const auto sigma = common_sigma(ground, found, distances, nearest);
+      if (!sigma) return tl::unexpected(sigma.error());
       const double next = std::max(kSigmas * *sigma, kLeast * unit);
-      const bool settled = near(next, tau);
-      tau = next;
+      const bool settled = near(next, tau, kSettled);
+      tau = step < kFreeSteps ? next : std::sqrt(tau * next);
       if (settled) break;
     }
-    if (near(tau, searched)) break;
+    known = as_known(found, kinds, result);
+    if (near(tau, searched, kAlike)) break;
   }
-  return tau;
+  return NoiseScale{tau, std::move(known)};
 }
 
 }  // namespace swarmfit::swarm

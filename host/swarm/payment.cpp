@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace swarmfit::swarm {
 
@@ -55,9 +56,10 @@ double log_false_alarms(double n, double share, double chance, int minimal_sampl
 
 double log_false_alarms(const Support& support, int minimal_sample) {
   if (support.inliers() == 0) return 1e300;
-  // The band is twice as wide as the model.
-  return log_false_alarms(static_cast<double>(support.unexplained), static_cast<double>(support.inliers()),
-                          0.5 * static_cast<double>(support.band()), minimal_sample);
+  // A swarm finds the place where a gap on either side flatters the model, so what is farther off has a say as well.
+  const auto wide = static_cast<double>(std::accumulate(support.slabs.begin() + 1, support.slabs.end(), std::size_t{0}));
+  const double background = std::max(static_cast<double>(support.band()) / 2, wide / static_cast<double>(Support::kSlabs - 1));
+  return log_false_alarms(static_cast<double>(support.unexplained), static_cast<double>(support.inliers()), background, minimal_sample);
 }
 
 bool pays(const Support& support, const Settings& settings, int minimal_sample) {

@@ -34,7 +34,8 @@ double saved(std::span<const float> caps, std::span<const float> distances);
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found = {});
 
 /// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
-/// binomial tail, background density from the band, one test for each minimal sample of the points). Lower is more meaningful.
+/// binomial tail, background density from the band or from all slabs beyond the first, whichever is denser, one test for each minimal
+/// sample of the points). Lower is more meaningful.
 double log_false_alarms(const Support& support, int minimal_sample);
 
 /// Two surfaces side by side are each other's surroundings, and neither would pay. So the ring from tau / 2 to tau may be the background as well,

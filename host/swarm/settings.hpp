@@ -43,6 +43,7 @@ struct Settings {
   int patience = 2;             ///< swarms in a row whose best does not pay before the fit ends
   bool refine = true;           ///< least squares on the inliers of what converged
   bool joint = true;            ///< refine all models together at the end
+  bool sharpen = true;          ///< where points are few, the joint end goes all the way to the least absolute deviations
   LabelPrices prices;           ///< of the joint end; where smoothness is 0 each point goes to the nearest model
   double threshold = 0.01;      ///< tau [data unit]
   std::size_t min_inliers = 0;  ///< resolved, >= 1

@@ -141,19 +141,26 @@ struct Bench {
         for (std::size_t i = 0; i < count; ++i, from += points.stride) std::memcpy(rows.data() + i * width, from, width * sizeof(float));
       }
     } else {
-      for (std::size_t i = 0; i < count; ++i, from += points.stride) {
-        std::array<double, kMaxDimension> row;
-        std::memcpy(row.data(), from, width * sizeof(double));
-        for (std::size_t d = 0; d < width; ++d) rows[i * width + d] = narrow(row[d] - pivot[d]);
-      }
+      if (width == 2) narrow_rows<2>(from, points.stride);
+      if (width == 3) narrow_rows<3>(from, points.stride);
+      if (width == 4) narrow_rows<4>(from, points.stride);
     }
     kernels.split(tight, width, count, origin.data(), limit, caps.empty() ? nullptr : caps.data(), strip, finite.data());
   }
 
-  /// To float; finite stays finite.
-  static float narrow(double v) {
+  /// Doubles about the pivot as floats: finite stays finite, anything else becomes NaN.
+  template <std::size_t Width>
+  void narrow_rows(const char* from, std::size_t stride) {
     constexpr double kMost = std::numeric_limits<float>::max();
-    return static_cast<float>(std::isfinite(v) ? std::clamp(v, -kMost, kMost) : v);
+    for (std::size_t i = 0; i < count; ++i, from += stride) {
+      double row[Width];
+      std::memcpy(row, from, sizeof row);
+      for (std::size_t d = 0; d < Width; ++d) {
+        const double v = row[d] - pivot[d];
+        const double low = v < kMost ? v : kMost, both = low > -kMost ? low : -kMost;
+        rows[i * Width + d] = static_cast<float>(both + (v - v));  // v - v is 0 for what is finite
+      }
+    }
   }
 };
 
