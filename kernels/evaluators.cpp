@@ -22,8 +22,10 @@ Result<Selection> selected(Result<std::unique_ptr<FitnessEvaluator>> made, std::
 }
 
 Result<Selection> choose_automatically(const EvaluatorOptions& options) {
+  // Asking every driver takes tens of milliseconds, and a process may make many evaluators; what is plugged in later is taken by name.
+  static const std::vector<DeviceDescription> devices = vulkan_devices();
   std::string why = "no GPU with Vulkan here";
-  for (const DeviceDescription& device : vulkan_devices()) {
+  for (const DeviceDescription& device : devices) {
     if (!device.usable || device.kind == "software") {
       if (device.kind == "software") why = fmt::format("the only Vulkan device, {}, is software", device.device);
       continue;
