@@ -20,7 +20,7 @@ double CurvedSpace::distance(const Position& a, const Position& b) const {
 }
 
 bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, Position& theta) const {
-  const auto least = static_cast<std::size_t>((freedom() + components() - 1) / components());
+  const auto least = static_cast<std::size_t>((freedom() + residual_components() - 1) / residual_components());
   if (support.index.size() < least) return false;
   Position best = theta;
   double damping = 1e-6;
@@ -60,7 +60,7 @@ Eigen::MatrixXd CurvedSpace::unit_covariance(const WorkingPoints& points, const 
 }
 
 double CurvedSpace::noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double) const {
-  const double degrees = static_cast<double>(support.index.size()) * components() - freedom();
+  const double degrees = static_cast<double>(support.index.size()) * residual_components() - freedom();
   return squares(points, support, theta) / std::max(1.0, degrees);
 }
 

@@ -24,8 +24,6 @@ class CurvedSpace : public ModelSpace {
   Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const override;
 
  protected:
-  /// Independent residual components of a point: 1 for a surface, 2 where a point must land on a point.
-  virtual int components() const noexcept = 0;
   /// Derivative of the position's entries by the chart, parameter_count() x freedom().
   virtual Basis basis(const Position& theta) const = 0;
   /// The position at `step` of the chart around theta.
@@ -58,7 +56,7 @@ class Linearised : public Base {
         by_parameter;  ///< derivative by the position's entries
   };
 
-  int components() const noexcept override { return Components; }
+  int residual_components() const noexcept override { return Components; }
 
   typename Base::Equations equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
     Eigen::Matrix<double, Parameters, Parameters> information = Eigen::Matrix<double, Parameters, Parameters>::Zero();

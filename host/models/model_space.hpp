@@ -33,6 +33,8 @@ class ModelSpace {
 
   virtual ModelType type() const noexcept = 0;
   virtual kernels::ModelKind kind() const noexcept = 0;
+  /// Independent components of a point's residual: 1 for a surface, 2 where a point must land on a point.
+  virtual int residual_components() const noexcept { return 1; }
   /// Points that determine a model.
   virtual int minimal_sample() const noexcept = 0;
   /// Entries of a position.

@@ -198,7 +198,9 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     if (auto done = swarm::refit(ground, found, search.shares_points(), hidden); !done) return tl::unexpected(done.error());
   }
   result.labels = thin_rows ? std::vector<std::uint16_t>{} : search.labels();
-  if (auto done = swarm::settle(ground, found, result); !done) return tl::unexpected(done.error());
+  std::vector<float> corners;
+  for (const models::Placed& model : search.found()) corners.push_back(search.corner(*model.space));
+  if (auto done = swarm::settle(ground, found, corners, result); !done) return tl::unexpected(done.error());
   result.backend = backend();
   result.seed = options.seed;
   result.finite_points = whole->finite_count();

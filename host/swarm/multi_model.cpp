@@ -14,8 +14,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
-constexpr float kSharper[] = {0.03F, 0.01F, 0.003F};  // corners, one after another, where points are few
-constexpr int kFullRounds = 1;                        // of refinement on all points, where it was done on a part of them before
+constexpr int kFullRounds = 1;    // of refinement on all points, where it was done on a part of them before
 
 }  // namespace
 
@@ -316,36 +315,6 @@ Expected<> MultiModel::share_out(FitResult& result) {
   labels_.resize(points_.size());
   labelling.write(labels_);
   count_effort(result);
-  return {};
-}
-
-Expected<> MultiModel::polish() {
-  // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs. Not so among kinds: a ball
-  // lies along the table that it lies on.
-  restore_caps();
-  std::vector<std::vector<float>> distances;
-  if (shares_points()) {
-    std::vector<models::Placed> all = found_;
-    all.insert(all.end(), hidden_.begin(), hidden_.end());
-    auto measured = measure(ground_, all);
-    if (!measured) return tl::unexpected(measured.error());
-    distances = std::move(*measured);
-  }
-  const auto refine_all = [&](float corner, int rounds) -> Expected<> {
-    for (std::size_t m = 0; m < found_.size(); ++m) {
-      if (!distances.empty()) left_by_others(distances, m, tau_, caps_);
-      Ground ground = ground_.of(*found_[m].space);
-      ground.corner = corner;
-      if (auto done = refine_one(ground, settings_.loss, caps_, found_[m].theta, rounds); !done) return tl::unexpected(done.error());
-    }
-    return {};
-  };
-  if (auto done = refine_all(ground_.corner, full_rounds()); !done) return done;
-  if (!settings_.sharpen || part_searched_ || settings_.loss != Loss::truncated_l1 || shares_out()) return {};
-  // Few points leave the least absolute deviations well apart from what rounded corners make of them.
-  for (const float corner : kSharper) {
-    if (auto done = refine_all(corner, kMostRounds); !done) return done;
-  }
   return {};
 }
 

@@ -49,6 +49,8 @@ class MultiModel {
   const std::vector<models::Placed>& hidden() const noexcept { return hidden_; }
   /// Has a model no say in what is nearer to another, be it hidden?
   bool shares_points() const noexcept { return asked_ > 1 || !hidden_.empty(); }
+  /// Corner of the loss that models of this kind were refined with last, of tau: 0 for the least absolute deviations, 1 for least squares.
+  float corner(const models::ModelSpace& of) const noexcept;
   /// Labels of the points where they were shared out jointly, with an eye to their neighbours; else empty, and the nearest model owns each.
   const std::vector<std::uint16_t>& labels() const noexcept { return labels_; }
 
@@ -82,6 +84,15 @@ class MultiModel {
   Expected<> deflate(const Candidate& candidate);
   Expected<> finish(FitResult& result);
   Expected<> polish();
+  /// The least absolute deviations of a model run through as many points as it has degrees of freedom (Barrodale and Roberts 1973):
+  /// from the points nearest to it, one at a time is exchanged for whichever lowers the loss most, until none does.
+  Expected<> run_through_points(models::Placed& model);
+  struct Exchange {
+    models::Position theta;
+    std::vector<std::uint32_t> sample;
+    double loss = 0;
+  };
+  Expected<bool> exchange_one(std::size_t kind, std::span<const std::uint32_t> candidates, std::size_t which, Exchange& best);
   void tell_parameters(FitResult& result) const;
   Expected<> share_out(FitResult& result);
   Expected<> search_further(Labelling& labelling);
@@ -93,6 +104,8 @@ class MultiModel {
   double elapsed_ms() const;
   double loss_of_nothing(std::span<const float> caps) const;
   bool shares_out() const noexcept;
+  /// Do models of this kind end at the least absolute deviations themselves?
+  bool sharpens(const models::ModelSpace& of) const noexcept;
   int full_rounds() const noexcept;  ///< of refinement on all points
   const Ground& searched() const noexcept { return part_searched_ ? part_ground_ : ground_; }
   const models::ModelSpace& space(std::size_t kind) const noexcept { return *kinds_[kind].space; }

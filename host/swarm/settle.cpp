@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/swarm/efficiency.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
@@ -30,6 +32,13 @@ Expected<> weigh_own(const Ground& whole, std::span<const kernels::ModelView> mo
     }
   }
   return {};
+}
+
+/// Of a residual of one component, by what truncation hides of the noise and by what the estimate is less efficient than least squares.
+double variance_factor(double tau, double corner, double rms) {
+  if (!(rms > 0)) return 1;
+  const double sigma = untruncated_deviation(rms, tau);
+  return sigma * sigma / (rms * rms) * variance_beside_least_squares(corner * tau / sigma, tau / sigma);
 }
 
 /// In the working frame; from the points themselves where their moments do not tell it.
@@ -96,7 +105,7 @@ Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool s
   return {};
 }
 
-Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, FitResult& result) {
+Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, std::span<const float> corners, FitResult& result) {
   const models::Frame& frame = whole.points.frame();
   const ModelRows models = rows_of(whole, found);
   std::vector<kernels::Evidence> evidence(found.size());
@@ -117,6 +126,8 @@ Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found,
     const auto& [space, theta] = found[m];
     model.type = space->type();
     model.covariance = space->covariance_to_data(covariance(whole.of(*space), evidence[m], result.labels, m + 1, theta), theta, frame);
+    if (space->residual_components() > 1) continue;
+    model.covariance *= variance_factor(static_cast<double>(whole.tau), static_cast<double>(corners[m]), model.rms);
   }
   return {};
 }

@@ -1,0 +1,126 @@
+// The joint end of models that share no points: each refined on what the others leave it.
+#include <algorithm>
+#include <numeric>
+
+#include "host/swarm/multi_model.hpp"
+#include "host/swarm/refinement.hpp"
+
+namespace swarmfit::swarm {
+namespace {
+
+constexpr float kOwn = 2;       // tau: points farther from a model have no say in its last steps
+constexpr int kExchanges = 30;  // of one of the points that a model runs through, at most
+
+/// Places of the `count` smallest of the distances that are at most `tau`, smallest first, and then the rest of those in their order.
+std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float tau, std::size_t count) {
+  std::vector<std::uint32_t> places;
+  for (std::uint32_t i = 0; i < distances.size(); ++i) {
+    if (distances[i] <= tau) places.push_back(i);
+  }
+  const auto middle = places.begin() + static_cast<std::ptrdiff_t>(std::min(count, places.size()));
+  std::partial_sort(places.begin(), middle, places.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return distances[a] < distances[b] || (distances[a] == distances[b] && a < b);
+  });
+  return places;
+}
+
+}  // namespace
+
+bool MultiModel::sharpens(const models::ModelSpace& of) const noexcept {
+  const bool asked = settings_.joint && settings_.sharpen && settings_.loss == Loss::truncated_l1;
+  return asked && !part_searched_ && !shares_out() && of.freedom() == of.minimal_sample();
+}
+
+float MultiModel::corner(const models::ModelSpace& of) const noexcept {
+  if (shares_out()) return 1;
+  return sharpens(of) ? 0 : ground_.corner;
+}
+
+Expected<> MultiModel::polish() {
+  // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs. Not so among kinds: a ball
+  // lies along the table that it lies on.
+  restore_caps();
+  std::vector<std::vector<float>> distances;
+  if (shares_points()) {
+    std::vector<models::Placed> all = found_;
+    all.insert(all.end(), hidden_.begin(), hidden_.end());
+    auto measured = measure(ground_, all);
+    if (!measured) return tl::unexpected(measured.error());
+    distances = std::move(*measured);
+  }
+  const auto refine_all = [&](float corner, int rounds) -> Expected<> {
+    for (std::size_t m = 0; m < found_.size(); ++m) {
+      if (!distances.empty()) left_by_others(distances, m, tau_, caps_);
+      Ground ground = ground_.of(*found_[m].space);
+      ground.corner = corner;
+      if (auto done = refine_one(ground, settings_.loss, caps_, found_[m].theta, rounds); !done) return tl::unexpected(done.error());
+    }
+    return {};
+  };
+  if (auto done = refine_all(ground_.corner, full_rounds()); !done) return done;
+  for (std::size_t m = 0; m < found_.size(); ++m) {
+    if (!sharpens(*found_[m].space)) continue;
+    if (!distances.empty()) left_by_others(distances, m, tau_, caps_);
+    if (auto done = run_through_points(found_[m]); !done) return done;
+  }
+  return {};
+}
+
+Expected<> MultiModel::run_through_points(models::Placed& model) {
+  const models::ModelSpace& of = *model.space;
+  const auto size = static_cast<std::size_t>(of.minimal_sample());
+  const auto kind = static_cast<std::size_t>(
+      std::find_if(kinds_.begin(), kinds_.end(), [&](const Kind& k) { return k.space.get() == model.space; }) - kinds_.begin());
+  std::vector<float> distances(points_.size());
+  if (auto done = weigh(ground_.of(of), model.theta, caps_, distances); !done) return tl::unexpected(done.error());
+  const std::vector<std::uint32_t> near = nearest_first(distances, tau_, size);
+  if (near.size() <= size) return {};
+  // Where two models cross, turning about their common point would lead from one to the other.
+  std::vector<float> own = caps_;
+  for (std::size_t i = 0; i < own.size(); ++i) own[i] = distances[i] <= kOwn * tau_ ? own[i] : 0.0F;
+  if (auto done = show(own); !done) return done;
+
+  Exchange best{model.theta, {near.begin(), near.begin() + static_cast<std::ptrdiff_t>(size)}, 0};
+  auto loss = landscapes_[kind].loss(model.theta);
+  if (!loss) return tl::unexpected(loss.error());
+  best.loss = *loss;
+  std::size_t fruitless = 0;
+  for (int exchange = 0; exchange < kExchanges && fruitless < size; ++exchange) {
+    auto better = exchange_one(kind, near, static_cast<std::size_t>(exchange) % size, best);
+    if (!better) return tl::unexpected(better.error());
+    fruitless = *better ? 0 : fruitless + 1;
+  }
+  model.theta = best.theta;
+  return {};
+}
+
+Expected<bool> MultiModel::exchange_one(std::size_t kind, std::span<const std::uint32_t> candidates, std::size_t which, Exchange& best) {
+  std::vector<models::Position> models;
+  std::vector<std::uint32_t> points, sample = best.sample;
+  for (const std::uint32_t point : candidates) {
+    if (std::find(best.sample.begin(), best.sample.end(), point) != best.sample.end() && point != best.sample[which]) continue;
+    sample[which] = point;
+    models::Position theta;
+    if (!space(kind).from_sample(points_, sample, theta)) continue;
+    models.push_back(theta);
+    points.push_back(point);
+  }
+  const auto at_once = static_cast<std::size_t>(settings_.particles);
+  bool better = false;
+  for (std::size_t first = 0; first < models.size(); first += at_once) {
+    const auto some = std::span(models).subspan(first, std::min(at_once, models.size() - first));
+    const std::vector<double> least(some.size(), best.loss);
+    std::vector<double> losses(some.size());
+    if (auto done = landscapes_[kind].fitness(some, least, losses); !done) return tl::unexpected(done.error());
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (!(losses[k] < best.loss)) continue;
+      best.loss = losses[k];
+      best.theta = some[k];
+      best.sample[which] = points[first + k];
+      better = true;
+    }
+  }
+  return better;
+}
+
+}  // namespace swarmfit::swarm
