@@ -257,7 +257,7 @@ TEST(Readme, ShowsTheProgramThatIsCompiledAndRun) {
 TEST(Readme, EveryFileItPointsToExists) {
   static const std::regex link(R"(\]\(([^)#:]+)\))");
   for (const char* page : {"README.md", "CONTRIBUTING.md", "docs/architecture.md", "docs/embedding.md", "docs/fitting.md", "docs/method.md",
-                           "docs/performance.md"}) {
+                           "docs/performance.md", "docs/report.md"}) {
     const std::string text = read(root / page);
     ASSERT_FALSE(text.empty()) << page;
     for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it) {

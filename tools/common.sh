@@ -30,3 +30,21 @@ python_environment() {
     return 1
   fi
 }
+
+# report_packages: report/node_modules, what the page of --report is bundled from. Says why where it cannot be had, and fails.
+report_packages() {
+  local stamp=report/node_modules/.installed wanted log=$root/build/report-packages.log
+  wanted=$(cksum <report/package-lock.json)
+  if [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ]; then return 0; fi
+  mkdir -p "$root/build"
+  if ! command -v npm >/dev/null; then
+    echo "the page of --report is left out: npm is not there (tools/setup.sh --report)" >&2
+    return 1
+  fi
+  if npm ci --prefix report --ignore-scripts --no-audit --no-fund --fetch-retries 1 >"$log" 2>&1; then
+    echo "$wanted" >"$stamp"
+  else
+    echo "the page of --report is left out: $(grep -m 1 -i error "$log" || tail -n 1 "$log")" >&2
+    return 1
+  fi
+}

@@ -20,6 +20,7 @@ esac
 
 tools/setup.sh
 mkdir -p build
+report_packages || true  # the build says what it leaves out
 say "building"
 configure release
 cmake --build --preset release --target swarmfit_cli

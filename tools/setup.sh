@@ -25,16 +25,22 @@ lint_packages=(clang-format clang-tidy)
 # the peers of bench/, and what plots their figures
 bench_packages=(libpcl-dev libopen3d-dev libcgal-dev python3-matplotlib)
 
+# what bundles the page of --report, and what its test opens it in
+report_packages=(chromium)
+if ! command -v node >/dev/null || ! command -v npm >/dev/null; then report_packages+=(nodejs npm); fi
+
 usage() {
-  echo "usage: tools/setup.sh [--lint] [--bench]"
+  echo "usage: tools/setup.sh [--lint] [--bench] [--report]"
   echo "  --lint   also the packages of tools/lint.sh: ${lint_packages[*]}"
   echo "  --bench  also those of tools/performance.sh, some gigabytes: ${bench_packages[*]}"
+  echo "  --report also what bundles and tests the page of swarmfit --report: ${report_packages[*]}"
 }
 
 for argument in "$@"; do
   case "$argument" in
     --lint) packages+=("${lint_packages[@]}") ;;
     --bench) packages+=("${bench_packages[@]}") ;;
+    --report) packages+=("${report_packages[@]}") ;;
     -h|--help) usage; exit 0 ;;
     *) usage >&2; exit 2 ;;
   esac

@@ -8,6 +8,7 @@ usage() {
 usage: tools/test.sh [--sanitize] [ctest argument...]
   --sanitize  build with AddressSanitizer and UndefinedBehaviorSanitizer, in a folder of its own
 The Python package is built and tested, too, where pip can fetch nanobind, numpy, pytest and mypy; not with --sanitize.
+The page of --report is bundled where npm can fetch its packages, and opened in a browser where there is Chromium (tools/setup.sh --report).
 Vulkan must work: Debian's software device will do, and tools/setup.sh installs it.
 SWARMFIT_DATA_DIR names a folder of captured data; tests that need it skip, and say so, where it is unset.
 END
@@ -25,6 +26,7 @@ python=(-DSWARMFIT_BUILD_PYTHON=OFF)
 if [ "$preset" = ci ] && python_environment; then
   python=(-DSWARMFIT_BUILD_PYTHON=ON "-DPython_EXECUTABLE=$root/build/python/bin/python")
 fi
+report_packages || true  # the build says what it leaves out
 say "building ($preset)"
 configure "$preset" "${python[@]}"
 cmake --build --preset "$preset"

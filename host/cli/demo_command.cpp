@@ -12,6 +12,7 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/html_report.hpp"
 #include "host/cli/identity_check.hpp"
 #include "host/cli/perceive.hpp"
 #include "host/cli/sequence.hpp"
@@ -71,6 +72,7 @@ int run_walk(const DemoArguments& arguments, std::size_t frames) {
   if (auto ok = arguments.fit.apply(job.options.fit); !ok) return complain(ok.error());
   if (auto ok = arguments.scene.apply(job.options); !ok) return complain(ok.error());
   if (!arguments.output.labels.empty()) return complain({Error::Kind::invalid_option, "--labels: is of one frame, not with --frames"});
+  if (!arguments.output.report.empty()) return complain({Error::Kind::invalid_option, "--report: is of one frame, not with --frames"});
   job.output = arguments.output;
   auto truth = std::make_shared<SceneTruth>();
   auto check = std::make_shared<IdentityCheck>();
@@ -89,7 +91,7 @@ int run_walk(const DemoArguments& arguments, std::size_t frames) {
   return run_sequence(job);
 }
 
-int run(const DemoArguments& arguments) {
+int run(const DemoArguments& arguments, const CLI::App& app) {
   if (!arguments.frames.empty()) {
     const auto frames = parse_number(arguments.frames);
     if (!frames || *frames < 1 || *frames > 1e6 || *frames != std::floor(*frames))
@@ -102,6 +104,7 @@ int run(const DemoArguments& arguments) {
   if (auto ok = arguments.scene.apply(job.options); !ok) return complain(ok.error());
   job.output = arguments.output;
   if (job.output.out.empty()) job.output.out = "swarmfit-demo";
+  job.notes = report_notes(app, arguments.motorcycle ? "Motorcycle" : "the built-in scene");
   return arguments.motorcycle ? run_motorcycle(std::move(job), arguments.pair) : run_room(std::move(job));
 }
 
@@ -120,10 +123,10 @@ Command add_demo(CLI::App& app) {
   a->fit.add_to(*sub);
   a->output.add_to(*sub, "A folder for the results; look at overlay.png [swarmfit-demo]");
   sub->footer("examples:\n  swarmfit demo\n  swarmfit demo --motorcycle --out motorcycle\n  swarmfit demo --frames 300 > walk.jsonl");
-  return {sub, [a, motorcycle] {
+  return {sub, [a, motorcycle, sub] {
             a->motorcycle = motorcycle->count() > 0;
             if (a->pair.empty()) a->pair = kPairFolder;
-            return run(*a);
+            return run(*a, *sub);
           }};
 }
 

@@ -11,10 +11,12 @@
 #include <fmt/format.h>
 
 #include <swarmfit/fit.hpp>
+#include <swarmfit/report.hpp>
 #include <swarmfit/results.hpp>
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/html_report.hpp"
 #include "host/cli/options.hpp"
 #include "host/cli/report.hpp"
 
@@ -87,7 +89,8 @@ Expected<Cloud> read_input(const FitArguments& arguments) {
   return read_depth(arguments.input, camera->intrinsics, camera->scale);
 }
 
-Expected<> write(const FitArguments& arguments, const FitResult& result, const Cloud& input, double load_ms) {
+Expected<> write(const FitArguments& arguments, const FitResult& result, const Cloud& input, double load_ms, const SearchRecord& search,
+                 const CLI::App& app) {
   const auto& output = arguments.output;
   const std::string json = to_json(result, input, load_ms);
   if (!output.json.empty()) {
@@ -95,6 +98,10 @@ Expected<> write(const FitArguments& arguments, const FitResult& result, const C
   }
   if (!output.labels.empty()) {
     if (auto ok = write_labels(output.labels, result.labels); !ok) return ok;
+  }
+  if (!output.report.empty()) {
+    const auto notes = report_notes(app, arguments.model + " " + fs::path(arguments.input).filename().string());
+    if (auto ok = write_report(output.report, report_page(result, input, load_ms, search, notes)); !ok) return ok;
   }
   if (output.out.empty()) return {};
   std::error_code error;
@@ -117,7 +124,7 @@ Expected<> tell_apart(FitArguments& arguments) {
   return {};
 }
 
-int run(FitArguments& arguments) {
+int run(FitArguments& arguments, const CLI::App& app) {
   if (auto ok = tell_apart(arguments); !ok) return complain(ok.error());
   const auto options = fit_options(arguments);
   if (!options) return complain(options.error());
@@ -125,6 +132,7 @@ int run(FitArguments& arguments) {
 
   const Interrupt interrupt;
   FitResult result;
+  SearchRecord search;
   Cloud input;
   double load_ms = 0, ready_ms = 0;
   {
@@ -145,8 +153,10 @@ int run(FitArguments& arguments) {
     progress.say("fitting");
     progress.within(options->time_budget_ms);
     std::size_t found = 0;
-    const auto on_model = [&](const Model&) {
+    if (!arguments.output.report.empty()) fitter->observe([&](const SwarmStep& step) { search.add(step); });
+    const auto on_model = [&](const Model& model) {
       ++found;
+      search.add(model);
       progress.step(fmt::format("fitting, {} found so far", found), found, options->max_models);
       return Verdict::go_on;
     };
@@ -155,7 +165,7 @@ int run(FitArguments& arguments) {
     result = std::move(*fitted);
   }
   const Stopwatch writing;
-  if (auto ok = write(arguments, result, input, load_ms); !ok) return complain(ok.error());
+  if (auto ok = write(arguments, result, input, load_ms, search, app); !ok) return complain(ok.error());
   if (arguments.output.verbose) {
     for (const std::string& line : explanation(result, input)) note(line);
     note(stages({{"back end", ready_ms}, {"loading", load_ms}, {"fit", result.total_ms}, {"writing", writing.ms()}}));
@@ -191,8 +201,9 @@ Command add_fit(CLI::App& app) {
       "  swarmfit fit plane cloud.pcd --normal 0,0,1 --within 10 --json result.json\n"
       "  swarmfit fit plane,cylinder,sphere scan.ply\n"
       "  swarmfit fit line2d points.csv --threshold auto\n"
+      "  swarmfit fit plane scan.ply --report scan.html\n"
       "  swarmfit fit plane depth.png --intrinsics 525,525,319.5,239.5 --depth-scale 0.001");
-  return {sub, [arguments] { return run(*arguments); }};
+  return {sub, [arguments, sub] { return run(*arguments, *sub); }};
 }
 
 }  // namespace swarmfit::cli

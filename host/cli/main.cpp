@@ -74,6 +74,7 @@ int run(int argc, const char* const* argv) {
 int main(int argc, char** argv) {
   swarmfit::cli::settle_process();
   try {
+    swarmfit::cli::remember_command(argc, argv);
     return swarmfit::cli::run(argc, argv);
   } catch (const std::bad_alloc&) {
     return swarmfit::cli::complain({swarmfit::Error::Kind::out_of_memory, "out of memory"});

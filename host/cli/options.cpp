@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include <swarmfit/report.hpp>
 #include <swarmfit/results.hpp>
 
 #include "host/cli/console.hpp"
@@ -134,18 +135,24 @@ Expected<> FitFlags::apply(FitOptions& options) const {
 }
 
 void OutputFlags::add_to(CLI::App& app, const std::string& out_help) {
-  const char* group = "Where results go";
+  const char* group = kGroup;
   app.add_option("--json", json, "The result as JSON: models, their parameters and covariance, times")->type_name("FILE")->group(group);
   app.add_option("--labels", labels, "Text, a whole number a line, a line a point: 0 none, k the k-th model")
       ->type_name("FILE")
       ->group(group);
   app.add_option("--out", out, out_help)->type_name("DIR")->group(group);
+  app.add_option("--report", report, "One HTML page to look at: the cloud in 3D, the search replayed, the image, the numbers")
+      ->type_name("FILE")
+      ->group(group);
   app.add_flag("--quiet", quiet, "No summary, no progress")->group(group);
   app.add_flag("--verbose", verbose, "What was decided on the way, and the time of each stage, on stderr")->group(group);
 }
 
 Expected<> OutputFlags::check() const {
-  for (const auto& file : {json, labels}) {
+  if (!report.empty()) {
+    if (auto ok = check_report(); !ok) return ok;
+  }
+  for (const auto& file : {json, labels, report}) {
     if (file.empty()) continue;
     if (auto ok = check_writable(file); !ok) return ok;
   }

@@ -35,11 +35,12 @@ struct FitFlags {
 
 /// Where results go.
 struct OutputFlags {
-  std::string json, labels, out;
+  static constexpr const char* kGroup = "Where results go";
+  std::string json, labels, out, report;
   bool quiet = false, verbose = false;
 
   void add_to(CLI::App& app, const std::string& out_help);
-  /// Fails with cannot_write, before any work is done.
+  /// Fails with cannot_write, before any work is done; also where this build can write no report.
   Expected<> check() const;
 };
 

@@ -6,6 +6,7 @@
 
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/perception.hpp>
+#include <swarmfit/report.hpp>
 
 #include "host/cli/options.hpp"
 
@@ -15,6 +16,7 @@ struct PerceiveJob {
   PerceiveOptions options;
   OutputFlags output;
   std::string input;  ///< what is read, for the progress line
+  ReportNotes notes;  ///< of the report, where one is asked for
   std::function<Expected<Cloud>()> read;
   /// Printed after the summary, where there is one.
   std::function<std::string(const PerceiveResult&, const Cloud&)> more;

@@ -9,11 +9,13 @@
 #include <fmt/format.h>
 
 #include <swarmfit/perception.hpp>
+#include <swarmfit/report.hpp>
 #include <swarmfit/results.hpp>
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
 #include "host/cli/frames.hpp"
+#include "host/cli/html_report.hpp"
 #include "host/cli/perceive.hpp"
 #include "host/cli/report.hpp"
 #include "host/cli/sequence.hpp"
@@ -31,12 +33,16 @@ struct PerceiveArguments {
   OutputFlags output;
 };
 
-Expected<> write(const OutputFlags& output, const PerceiveResult& result, const Cloud& input) {
+Expected<> write(const PerceiveJob& job, const PerceiveResult& result, const Cloud& input, const SearchRecord& search) {
+  const OutputFlags& output = job.output;
   if (!output.json.empty()) {
     if (auto ok = write_text(output.json, to_json(result, input)); !ok) return ok;
   }
   if (!output.labels.empty()) {
     if (auto ok = write_labels(output.labels, result.fit.labels); !ok) return ok;
+  }
+  if (!output.report.empty()) {
+    if (auto ok = write_report(output.report, report_page(result, input, search, job.notes)); !ok) return ok;
   }
   return output.out.empty() ? Expected<>() : write_perception(output.out, result, input);
 }
@@ -80,6 +86,7 @@ Expected<FrameSource> source(const PerceiveArguments& a) {
     frames = std::move(*listed);
   }
   if (!a.output.labels.empty()) return invalid("--labels: is of one frame; for a sequence --out gives planes.png of each");
+  if (!a.output.report.empty()) return invalid("--report: is of one frame, not of a sequence");
   if (from_stdin) {
     if (!a.fps.empty()) return invalid("--fps: frames named on stdin come when they come");
     return read_names(camera, a.drop.value_or(true));
@@ -104,7 +111,7 @@ int run_frames(const PerceiveArguments& arguments) {
   return run_sequence(job);
 }
 
-int run(const PerceiveArguments& arguments) {
+int run(const PerceiveArguments& arguments, const CLI::App& app) {
   const bool alone =
       arguments.color.empty() && arguments.depth.empty() && arguments.left.empty() && arguments.right.empty() && arguments.calib.empty();
   if (alone && is_sequence(arguments.inputs)) return run_frames(arguments);
@@ -119,6 +126,7 @@ int run(const PerceiveArguments& arguments) {
   job.read = std::move(*read);
   job.input = !arguments.inputs.empty() ? arguments.inputs.front() : !arguments.depth.empty() ? arguments.depth : arguments.left;
   job.output = arguments.output;
+  job.notes = report_notes(app, std::filesystem::path(job.input).filename().string());
   return run_perceive(job);
 }
 
@@ -128,6 +136,7 @@ int run_perceive(const PerceiveJob& job) {
   if (auto ok = job.output.check(); !ok) return complain(ok.error());
   const Interrupt interrupt;
   PerceiveResult result;
+  SearchRecord search;
   Cloud input;
   {
     Progress progress(job.output.quiet);
@@ -144,8 +153,10 @@ int run_perceive(const PerceiveJob& job) {
 
     progress.say("perceiving");
     std::size_t found = 0;
-    const auto on_plane = [&](const Model&) {
+    if (!job.output.report.empty()) perceiver->observe([&](const SwarmStep& step) { search.add(step); });
+    const auto on_plane = [&](const Model& plane) {
       ++found;
+      search.add(plane);
       progress.step(fmt::format("perceiving, {} planes so far", found), found);
       return Verdict::go_on;
     };
@@ -154,7 +165,7 @@ int run_perceive(const PerceiveJob& job) {
     result = std::move(*perceived);
     result.timing_ms.load = load_ms;
     progress.say("writing");
-    if (auto ok = write(job.output, result, input); !ok) return complain(ok.error());
+    if (auto ok = write(job, result, input, search); !ok) return complain(ok.error());
   }
   if (job.output.verbose) {
     for (const std::string& line : explanation(result.fit, input)) note(line);
@@ -206,12 +217,13 @@ Command add_perceive(CLI::App& app) {
   sub->footer(
       "examples:\n"
       "  swarmfit perceive table.pcd --out result\n"
+      "  swarmfit perceive table.pcd --report table.html\n"
       "  swarmfit perceive --color c.png --depth d.png --intrinsics 613,613,322,248 --depth-scale 0.001 --out result\n"
       "  swarmfit perceive --left im0.png --right im1.png --calib calib.txt --gallery objects --out result\n"
       "  swarmfit perceive frames/ > frames.jsonl                                 all clouds of a folder, planes and things by their ids\n"
       "  swarmfit perceive rgbd/ --intrinsics 613,613,322,248 --out results       pairs like 7.color.png, 7.depth.png\n"
       "  camera-driver | swarmfit perceive - --gravity 0,1,0                      names of frames as they come");
-  return {sub, [a] { return run(*a); }};
+  return {sub, [a, sub] { return run(*a, *sub); }};
 }
 
 }  // namespace swarmfit::cli

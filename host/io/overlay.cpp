@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 
 #include <swarmfit/results.hpp>
 
+#include "host/io/ground_image.hpp"
 #include "host/io/palette.hpp"
 
 namespace swarmfit {
@@ -23,30 +23,6 @@ cv::Scalar scalar(const io::Rgb& colour) { return {double(colour[0]), double(col
 /// Lines, text and margins grow with the image.
 double scale_of(const cv::Mat& image) { return std::clamp(image.cols / 640.0, 0.4, 3.0); }
 int stroke(const cv::Mat& image, double width) { return std::max(1, static_cast<int>(std::lround(width * scale_of(image)))); }
-
-/// The camera's image, or depth in grey where there is no colour. RGB.
-cv::Mat ground(const Cloud& input) {
-  cv::Mat image(input.height, input.width, CV_8UC3, cv::Scalar::all(30));
-  if (input.coloured()) {
-    std::copy(input.rgb.begin(), input.rgb.end(), image.data);
-    return image;
-  }
-  const auto depth = [&](std::size_t i) {
-    return input.values64.empty() ? static_cast<double>(input.values32[3 * i + 2]) : input.values64[3 * i + 2];
-  };
-  double nearest = std::numeric_limits<double>::infinity(), farthest = -nearest;
-  for (std::size_t i = 0; i < input.size(); ++i) {
-    if (!std::isfinite(depth(i))) continue;
-    nearest = std::min(nearest, depth(i));
-    farthest = std::max(farthest, depth(i));
-  }
-  for (std::size_t i = 0; i < input.size(); ++i) {
-    if (!std::isfinite(depth(i))) continue;
-    const double share = farthest > nearest ? (depth(i) - nearest) / (farthest - nearest) : 0;
-    std::fill_n(image.data + 3 * i, 3, static_cast<std::uint8_t>(220 - 160 * share));
-  }
-  return image;
-}
 
 void blend(std::uint8_t* pixel, const io::Rgb& colour, double share) {
   for (std::size_t c = 0; c < 3; ++c) pixel[c] = static_cast<std::uint8_t>(std::lround(pixel[c] * (1 - share) + colour[c] * share));
@@ -144,7 +120,7 @@ void draw_legend(cv::Mat& image, const PerceiveResult& result) {
 }  // namespace
 
 std::vector<std::uint8_t> render_overlay(const PerceiveResult& result, const Cloud& input) {
-  cv::Mat image = ground(input);
+  cv::Mat image = io::ground_image(input);
   tint(image, result);
   draw_outlines(image, result);
   draw_sois(image, result);

@@ -67,6 +67,17 @@ void give_to_objects(const std::vector<std::uint16_t>& objects, FitResult& fit) 
   }
 }
 
+/// An observer of planes in the grid's frame, told by one of planes in the data's.
+SwarmObserver in_data_frame(const SwarmObserver& observer, const Eigen::Vector3d& origin) {
+  if (!observer) return {};
+  return [&observer, origin](const SwarmStep& step) {
+    SwarmStep moved = step;
+    moved.positions.row(3) -= origin.transpose() * moved.positions.topRows<3>();
+    moved.best[3] -= origin.dot(moved.best.head<3>());
+    observer(moved);
+  };
+}
+
 }  // namespace
 
 struct Perceiver::State {
@@ -76,6 +87,7 @@ struct Perceiver::State {
   std::optional<Fitter> fitter;  ///< of any plane until the vertical is known, then of horizontal ones
   std::optional<perception::Gallery> gallery;
   perception::Tracker tracker;
+  SwarmObserver observer;
 
   FitOptions fit_options() const;
   Expected<> suit_sensor(const Cloud& frame);
@@ -175,6 +187,8 @@ Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) {
   return Perceiver(std::move(state));
 }
 
+void Perceiver::observe(SwarmObserver observer) { state_->observer = std::move(observer); }
+
 Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCallback& on_plane, std::stop_token stop) try {
   if (frame.dimension != 3)
     return fail(Error::Kind::bad_input, fmt::format("the cloud has {} columns, must have 3 to perceive", frame.dimension));
@@ -191,8 +205,10 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   std::vector<Surface> supports;
   if (state_->vertical) {
     result.up = state_->vertical->up;
+    state_->fitter->observe(in_data_frame(state_->observer, grid.origin));
     auto search =
         perception::find_supports(*state_->fitter, grid, overview, result.up, state_->options, on_plane, stop, state_->last_planes(grid));
+    state_->fitter->observe({});
     if (!search) return tl::unexpected(search.error());
     result.fit = std::move(search->fit);
     supports = std::move(search->supports);

@@ -95,6 +95,7 @@ struct Fitter::State {
   FitOptions options;
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
+  SwarmObserver observer;
 
   kernels::EvaluatorOptions wanted() const {
     kernels::EvaluatorOptions w;
@@ -119,6 +120,8 @@ Expected<Fitter> Fitter::create(const FitOptions& options) {
   state->reason = std::move(made->reason);
   return Fitter(std::move(state));
 }
+
+void Fitter::observe(SwarmObserver observer) { state_->observer = std::move(observer); }
 
 const FitOptions& Fitter::options() const noexcept { return state_->options; }
 
@@ -176,10 +179,12 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 
   FitResult result;
+  swarm::Watch watch{state_->observer, 0};
   std::vector<swarm::Known> known;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
   if (options.estimate_threshold || !given) {
-    auto estimated = swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options);
+    auto estimated =
+        swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options, state_->observer ? &watch : nullptr);
     if (!estimated) return tl::unexpected(estimated.error());
     result.threshold = estimated->threshold;
     // The preset of the paper finds each model by a search of its own.
@@ -189,6 +194,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   }
   swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
   swarm::MultiModel search(evaluator, kinds, working, part, options.seed, limits);
+  search.watched_by(state_->observer ? &watch : nullptr);
   if (auto done = search.run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
   std::vector<models::Placed> found = search.found();
   const swarm::Ground ground{evaluator, *kinds.front().space, *whole, static_cast<float>(result.threshold)};

@@ -157,10 +157,31 @@ Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t rou
       stop_reason_ = *reason;
       return false;
     }
-    if (auto done = swarm.step(landscapes_[kind], sampler, scale_); !done) return tl::unexpected(done.error());
+    auto done = watch_ != nullptr ? watched_step(swarm, kind, sampler) : swarm.step(landscapes_[kind], sampler, scale_);
+    if (!done) return tl::unexpected(done.error());
   }
+  if (watch_ != nullptr) ++watch_->swarms;
   steps_ += static_cast<std::size_t>(swarm.steps());
   return true;
+}
+
+Expected<> MultiModel::watched_step(Swarm& swarm, std::size_t kind, const Sampler& sampler) {
+  SwarmStep step;
+  step.type = space(kind).type();
+  step.swarm = watch_->swarms;
+  step.step = static_cast<std::size_t>(swarm.steps());
+  // Where particles are when they are scored: before they move on.
+  const auto positions = swarm.positions();
+  step.positions.resize(space(kind).parameter_count(), static_cast<Eigen::Index>(positions.size()));
+  for (std::size_t j = 0; j < positions.size(); ++j)
+    step.positions.col(static_cast<Eigen::Index>(j)) = space(kind).to_data(positions[j], points_.frame());
+  if (auto done = swarm.step(landscapes_[kind], sampler, scale_); !done) return done;
+  step.fitness.assign(swarm.fitness().begin(), swarm.fitness().end());
+  step.best = space(kind).to_data(swarm.best(), points_.frame());
+  step.best_fitness = swarm.best_fitness();
+  step.nothing_explained = scale_;
+  watch_->observer(step);
+  return {};
 }
 
 Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate) {

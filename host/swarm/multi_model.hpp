@@ -21,6 +21,7 @@
 namespace swarmfit::swarm {
 
 class Labelling;
+class Sampler;
 class Swarm;
 
 using Clock = std::chrono::steady_clock;
@@ -33,12 +34,21 @@ struct Limits {
   std::size_t max_models = 0;
 };
 
+/// Who looks on, over all searches of one fit.
+struct Watch {
+  SwarmObserver observer;  ///< never empty
+  std::size_t swarms = 0;  ///< flown so far, of whatever purpose
+};
+
 class MultiModel {
  public:
   /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are drawn
   /// from, and where the settings say so what swarms search. `evaluator` is given what is searched. `kinds` must outlive this.
   MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points, const Part& part,
              std::uint64_t seed, Limits limits);
+
+  /// Told of each step of each swarm; must outlive this. Null: nobody is.
+  void watched_by(Watch* watch) noexcept { watch_ = watch; }
 
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
   /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.
@@ -75,6 +85,7 @@ class MultiModel {
   /// least `alive`.
   Expected<bool> fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
                      std::span<const float> caps, float alive);
+  Expected<> watched_step(Swarm& swarm, std::size_t kind, const Sampler& sampler);
   /// Takes a model without a search, if it pays.
   Expected<> adopt(const Known& known, const ModelCallback& on_model, FitResult& result);
   /// What follows once a search has come to a model, be it a hidden one.
@@ -150,6 +161,7 @@ class MultiModel {
   double scale_ = 0;                        // loss of a model that explains nothing
   std::size_t steps_ = 0;                   // of this round's swarms
   std::uint32_t round_ = 0, contests_ = 0;  // swarms flown so far
+  Watch* watch_ = nullptr;
   std::string stop_reason_;
 };
 

@@ -78,7 +78,7 @@ bool near(double a, double b, double share) { return std::abs(a - b) <= share * 
 }  // namespace
 
 Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
-                                        std::size_t finite_points, const FitOptions& options) {
+                                        std::size_t finite_points, const FitOptions& options, Watch* watch) {
   std::vector<Kind> kinds = make_kinds(options);
   std::erase_if(kinds, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
   const double unit = points.frame().scale;
@@ -92,6 +92,7 @@ Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, co
     Limits limits;
     limits.max_models = kModels;
     MultiModel search(evaluator, kinds, points, part, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
+    search.watched_by(watch);
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
     std::vector<models::Placed> found = search.found();

@@ -10,6 +10,8 @@
 
 namespace swarmfit::swarm {
 
+struct Watch;
+
 /// Standard deviation of the Gaussian part of |distances| within `reach`, against a uniform background; by expectation-maximisation
 /// from `guess`. Distances beyond reach and NaN are left out. 0 where there is none.
 double gaussian_part(std::span<const float> distances, double guess, double reach);
@@ -21,8 +23,8 @@ struct NoiseScale {
 
 /// tau = 2.5 sigma, sigma the noise of the most prominent models: a swarm finds one under a generous threshold, the spread of its
 /// inliers gives the next threshold, until that stays. `points` stand for a whole cloud of `finite_points`; `part` of them as MultiModel
-/// takes it. Fails with bad_input where the data show no scale.
+/// takes it; `watch` may look on. Fails with bad_input where the data show no scale.
 Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
-                                        std::size_t finite_points, const FitOptions& options);
+                                        std::size_t finite_points, const FitOptions& options, Watch* watch = nullptr);
 
 }  // namespace swarmfit::swarm

@@ -16,6 +16,7 @@
 #include <swarmfit/export.hpp>
 #include <swarmfit/model.hpp>
 #include <swarmfit/points.hpp>
+#include <swarmfit/trace.hpp>
 
 namespace swarmfit {
 
@@ -97,6 +98,9 @@ class SWARMFIT_API Fitter {
   /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension).
   Expected<FitResult> fit(const PointsView& points, const ModelCallback& on_model = {}, std::stop_token stop = {},
                           const std::vector<Model>& warm_start = {});
+
+  /// Told of each step of the swarms, also of those that look for models to estimate the threshold from; empty: nobody is.
+  void observe(SwarmObserver observer);
 
   const FitOptions& options() const noexcept;
   /// Options of the fits to come, on the same back end. Fails with invalid_option, also where backend, threads or pipeline_cache differ.

@@ -83,6 +83,9 @@ class SWARMFIT_API Perceiver {
   /// An organised coloured cloud goes through the whole chain; without colour or grid the stages that need them are left out.
   Expected<PerceiveResult> perceive(const Cloud& frame, const ModelCallback& on_plane = {}, std::stop_token stop = {});
 
+  /// Told of each step of the swarms that look for level planes; empty: nobody is.
+  void observe(SwarmObserver observer);
+
  private:
   struct State;
   explicit Perceiver(std::unique_ptr<State> state);

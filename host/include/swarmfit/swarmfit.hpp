@@ -12,6 +12,8 @@
 #include <swarmfit/model.hpp>
 #include <swarmfit/perception.hpp>
 #include <swarmfit/points.hpp>
+#include <swarmfit/report.hpp>
 #include <swarmfit/results.hpp>
 #include <swarmfit/scene.hpp>
+#include <swarmfit/trace.hpp>
 #include <swarmfit/version.hpp>

@@ -1,0 +1,146 @@
+// The camera's image and what is drawn on it.
+import {css, modelColour, objectColour} from './colours.js';
+import {$, choices, slider} from './dom.js';
+import {distanceColour} from './paint.js';
+
+const uncertain = 65535;
+
+export class Picture {
+  /** `describe(i)` gives words for a shown point, `onHover(i)` is told which point is under the pointer, -1 none. */
+  constructor(page, distances, describe, onHover) {
+    Object.assign(this, {page, distances, describe, onHover, image: page.image, by: 'all', strength: 0.6});
+    this.canvas = $('image');
+    this.canvas.width = this.image.width;
+    this.canvas.height = this.image.height;
+    this.pointAt = this.pointsOfPixels();
+    $('image-part').hidden = false;
+    this.controls();
+    this.image.source.decode().then(() => this.draw());
+    this.canvas.addEventListener('pointermove', (event) => this.hover(event));
+    this.canvas.addEventListener('pointerleave', () => this.hover());
+  }
+
+  controls() {
+    const bar = $('image-toolbar'), perceived = this.page.about.kind === 'perceive';
+    const options = [['all', perceived ? 'Planes and things' : 'Models']];
+    if (perceived) options.push(['planes', 'Planes'], ['popout', 'What sticks out'], ['objects', 'Outlines']);
+    options.push(['distance', 'Distance'], ['none', this.image.coloured ? 'Photo' : 'Depth']);
+    choices(bar, 'What is drawn on the image', options, this.by, (value) => {
+      this.by = value;
+      this.draw();
+    });
+    slider(bar, 'strength', {min: 0.15, max: 1, step: 0.05, value: this.strength}, (value) => {
+      this.strength = value;
+      this.draw();
+    });
+  }
+
+  /** By pixel of the canvas the point that is shown there, -1 none. */
+  pointsOfPixels() {
+    const {cloud} = this.page, {width, height, every} = this.image;
+    const at = new Int32Array(width * height).fill(-1);
+    const block = Math.max(1, Math.round(cloud.every / every));
+    for (let i = 0; i < cloud.count; ++i) {
+      const u = Math.floor((cloud.index[i] % cloud.width) / every), v = Math.floor(Math.floor(cloud.index[i] / cloud.width) / every);
+      for (let y = v; y < Math.min(height, v + block); ++y) at.fill(i, y * width + u, y * width + Math.min(width, u + block));
+    }
+    return at;
+  }
+
+  colourAt(pixel) {
+    const {planes, popout, objects} = this.image;
+    const of = (labels, colour) => (labels && labels[pixel] > 0 && labels[pixel] !== uncertain ? colour(labels[pixel]) : undefined);
+    switch (this.by) {
+      case 'planes': return of(planes, modelColour);
+      case 'popout': return of(popout, objectColour);
+      case 'objects': return objects?.[pixel] === uncertain ? [255, 255, 255] : of(objects, objectColour);
+      case 'distance': return this.pointAt[pixel] < 0 ? undefined : distanceColour(this.distances()[this.pointAt[pixel]], this.page.result.threshold);
+      case 'all': return of(objects ?? popout, objectColour) ?? of(planes, modelColour);
+      default: return undefined;
+    }
+  }
+
+  draw() {
+    const {width, height} = this.image, context = this.canvas.getContext('2d');
+    context.drawImage(this.image.source, 0, 0, width, height);
+    if (this.by !== 'none') this.tint(context, width, height);
+    if (this.by === 'all' || this.by === 'objects') this.outlines(context, width, height);
+    if (this.page.about.kind === 'perceive' && this.by !== 'none' && this.by !== 'distance') this.boxes(context);
+    if (this.marked >= 0) this.ring(context);
+  }
+
+  tint(context, width, height) {
+    const layer = new OffscreenCanvas(width, height), paint = layer.getContext('2d'), data = paint.createImageData(width, height);
+    for (let pixel = 0; pixel < width * height; ++pixel) {
+      const colour = this.colourAt(pixel);
+      if (!colour) continue;
+      data.data.set(colour, 4 * pixel);
+      data.data[4 * pixel + 3] = 255;
+    }
+    paint.putImageData(data, 0, 0);
+    context.globalAlpha = this.strength;
+    context.drawImage(layer, 0, 0);
+    context.globalAlpha = 1;
+  }
+
+  /** White where a proto-object ends. */
+  outlines(context, width, height) {
+    const {objects} = this.image;
+    if (!objects) return;
+    const own = (label) => (label === uncertain ? 0 : label);
+    context.fillStyle = '#fff';
+    for (let y = 1; y < height; ++y) {
+      for (let x = 1; x < width; ++x) {
+        const label = own(objects[y * width + x]);
+        if (label !== own(objects[y * width + x - 1]) || label !== own(objects[(y - 1) * width + x])) context.fillRect(x - 1, y - 1, 1.5, 1.5);
+      }
+    }
+  }
+
+  boxes(context) {
+    const scale = 1 / this.image.every, size = Math.max(11, Math.round(this.image.width / 50));
+    context.font = `600 ${size}px system-ui, sans-serif`;
+    context.textBaseline = 'bottom';
+    this.page.result.sois.forEach((soi, k) => {
+      const [x, y, w, h] = soi.bbox.map((v) => v * scale);
+      if (w === 0) return;
+      const words = soi.recognised[0]?.name ?? String(k + 1), wide = context.measureText(words).width + 8;
+      context.strokeStyle = context.fillStyle = css(objectColour(k + 1));
+      context.lineWidth = Math.max(1, this.image.width / 640);
+      context.strokeRect(x, y, w, h);
+      const top = Math.max(y, size + 4);
+      context.fillRect(x, top - size - 4, wide, size + 4);
+      context.fillStyle = '#111';
+      context.fillText(words, x + 4, top - 1);
+    });
+  }
+
+  /** Marks a point, -1 none. */
+  mark(point) {
+    if (point === this.marked) return;
+    this.marked = point;
+    this.draw();
+  }
+
+  ring(context) {
+    const {cloud} = this.page, i = cloud.index[this.marked];
+    context.beginPath();
+    context.arc((i % cloud.width) / this.image.every, Math.floor(i / cloud.width) / this.image.every, this.image.width / 64, 0, 2 * Math.PI);
+    context.lineWidth = Math.max(2, this.image.width / 320);
+    context.strokeStyle = '#fff';
+    context.stroke();
+  }
+
+  hover(event) {
+    let point = -1, words = '';
+    if (event) {
+      const {left, top, width} = this.canvas.getBoundingClientRect(), scale = this.image.width / width;
+      const x = Math.floor((event.clientX - left) * scale), y = Math.floor((event.clientY - top) * scale);
+      point = this.pointAt[y * this.image.width + x] ?? -1;
+      words = `${x * this.image.every}, ${y * this.image.every}: ` + (point < 0 ? 'no depth' : this.describe(point).join(', '));
+    }
+    $('image-note').textContent = words;
+    this.onHover(point);
+  }
+}
+

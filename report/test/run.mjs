@@ -1,0 +1,107 @@
+// Opens pages that the command has written in a headless Chromium, on a desktop and on a phone, light and dark, and uses what is on them.
+//   node run.mjs COMMAND [--shots DIR] [--only NAME,...]      screenshots of every page on every screen go into DIR
+// Ends with 77, and says why, where it cannot be run: no Chromium, no playwright-core. SWARMFIT_CHROMIUM names the browser,
+// SWARMFIT_DATA_DIR captured data, which are looked at too where they are.
+import {execFileSync} from 'node:child_process';
+import {existsSync, mkdirSync, mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {delimiter, join, resolve} from 'node:path';
+import {pathToFileURL} from 'node:url';
+
+import {lines, pairs, solids} from './scenes.mjs';
+import {usePage} from './use.mjs';
+
+const cannotRun = 77;
+
+function skip(reason) {
+  console.log(`skipped: ${reason}`);
+  process.exit(cannotRun);
+}
+
+function browserProgram() {
+  if (process.env.SWARMFIT_CHROMIUM) return process.env.SWARMFIT_CHROMIUM;
+  for (const name of ['chromium', 'chromium-browser', 'google-chrome', 'chrome']) {
+    for (const folder of (process.env.PATH ?? '').split(delimiter)) {
+      if (folder && existsSync(join(folder, name))) return join(folder, name);
+    }
+  }
+  return undefined;
+}
+
+const screens = {
+  'desktop-light': {viewport: {width: 1440, height: 900}, colorScheme: 'light'},
+  'desktop-dark': {viewport: {width: 1440, height: 900}, colorScheme: 'dark'},
+  'phone-light': {viewport: {width: 390, height: 844}, colorScheme: 'light', deviceScaleFactor: 2, isMobile: true, hasTouch: true},
+  'phone-dark': {viewport: {width: 390, height: 844}, colorScheme: 'dark', deviceScaleFactor: 2, isMobile: true, hasTouch: true},
+};
+
+/** name: the arguments of the command, and what the page must show. */
+function cases(folder) {
+  writeFileSync(join(folder, 'lines.csv'), lines());
+  writeFileSync(join(folder, 'solids.csv'), solids());
+  writeFileSync(join(folder, 'pairs.csv'), pairs());
+  const all = [
+    {name: 'lines', arguments: ['fit', 'line2d', 'lines.csv'], models: 4, screens: ['desktop-light', 'phone-dark']},
+    {name: 'solids', arguments: ['fit', 'plane,sphere,cylinder', 'solids.csv'], models: 4, screens: ['desktop-dark']},
+    {name: 'pairs', arguments: ['fit', 'homography', 'pairs.csv'], models: 2, screens: ['phone-light']},
+    {name: 'demo', arguments: ['demo', '--out', 'demo'], image: true, things: true, screens: ['desktop-dark', 'phone-light']},
+  ];
+  const data = process.env.SWARMFIT_DATA_DIR;
+  if (!data) {
+    console.log('SWARMFIT_DATA_DIR is unset: captured data are left out');
+    return all;
+  }
+  const table = join(data, 'middlebury/Playtable');
+  const captured = [
+    {name: 'mosd', file: join(data, 'mosd/learn0.pcd'), arguments: ['perceive', join(data, 'mosd/learn0.pcd')], image: true, things: true, screens: ['desktop-light']},
+    {name: 'room', file: join(data, 'clouds/room_scan1.pcd'), arguments: ['fit', 'plane', join(data, 'clouds/room_scan1.pcd'), '--threshold', '0.03'], screens: ['desktop-dark']},
+    {name: 'playtable', file: table, image: true, things: true, screens: ['phone-dark'],
+      arguments: ['perceive', '--left', join(table, 'im0.png'), '--right', join(table, 'im1.png'), '--calib', join(table, 'calib.txt')]},
+  ];
+  for (const one of captured) {
+    if (existsSync(one.file)) all.push(one);
+    else console.log(`${one.file} is not there: left out`);
+  }
+  return all;
+}
+
+const [command, ...rest] = process.argv.slice(2);
+const argument = (name) => (rest.includes(name) ? rest[rest.indexOf(name) + 1] : undefined);
+const shots = argument('--shots'), only = argument('--only')?.split(',');
+const program = browserProgram();
+if (!program) skip('no Chromium on the PATH (on Debian: tools/setup.sh --report)');
+let chromium;
+try {
+  ({chromium} = await import('playwright-core'));
+} catch {
+  skip('playwright-core is not installed (npm ci --prefix report)');
+}
+
+const folder = mkdtempSync(join(tmpdir(), 'swarmfit-report-'));
+if (shots) mkdirSync(shots, {recursive: true});
+const browser = await chromium.launch({
+  executablePath: program,
+  args: ['--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
+});
+let failures = 0;
+try {
+  for (const one of cases(folder)) {
+    if (only && !only.includes(one.name)) continue;
+    const page = join(folder, `${one.name}.html`);
+    execFileSync(resolve(command), [...one.arguments, '--report', page, '--quiet'], {cwd: folder, stdio: ['ignore', 'inherit', 'inherit']});
+    for (const [screen, options] of Object.entries(screens)) {
+      if (!shots && !one.screens.includes(screen)) continue;
+      const started = Date.now();
+      const problems = await usePage(browser, pathToFileURL(page).href, options, one, shots && join(shots, `${one.name}-${screen}`));
+      failures += problems.length;
+      console.log(`${problems.length === 0 ? 'ok  ' : 'FAIL'} ${one.name}, ${screen}, ${((Date.now() - started) / 1000).toFixed(1)} s`);
+      for (const problem of problems) console.log(`     ${problem}`);
+    }
+  }
+} finally {
+  await browser.close();
+  rmSync(folder, {recursive: true, force: true});
+}
+console.log(failures === 0 ? 'the pages work' : `${failures} problems`);
+process.exit(failures === 0 ? 0 : 1);
