@@ -112,14 +112,31 @@ export class FitnessChart {
 /** Steps that were flown, of which some may have been left out. */
 const count = (search) => search.steps.length * search.every;
 
+const directionOf = {plane: (p) => [p[0], p[1], p[2]], cylinder: (p) => [p[3], p[4], p[5]]};
+
+/** Lambert's equal areas about the vertical, upright directions at 1; n and -n are one direction. */
+function around([x, y, z], up) {
+  const [u, v, w] = [up.u, up.v, up.w].map((axis) => x * axis[0] + y * axis[1] + z * axis[2]);
+  const sign = w < 0 ? -1 : 1, size = 1 / Math.sqrt(1 + Math.abs(w));
+  return [sign * u * size, -sign * v * size];
+}
+
+const sizeOf = (degrees) => Math.sqrt(1 - Math.cos((degrees * Math.PI) / 180));
+
+/** The least of a few round angles from the vertical within which all particles' directions are. */
+function rimOf(search, up) {
+  let most = 0;
+  for (const step of search.steps) {
+    const direction = directionOf[step.type];
+    if (!direction) continue;
+    for (let at = 0; at < step.particles.length; at += step.width) most = Math.max(most, Math.hypot(...around(direction(step.particles.subarray(at, at + step.width)), up)));
+  }
+  return [5, 10, 15, 20, 30, 45, 60].find((degrees) => sizeOf(degrees) > most) ?? 90;
+}
+
 /** How a kind's parameters become a place in [-1, 1]^2, and what that is called. */
-function maps(type, radius, up) {
-  const around = ([x, y, z]) => {
-    // Lambert's equal areas about the vertical; n and -n are one direction.
-    const [u, v, w] = [up.u, up.v, up.w].map((axis) => x * axis[0] + y * axis[1] + z * axis[2]);
-    const sign = w < 0 ? -1 : 1, size = 1 / Math.sqrt(1 + Math.abs(w));
-    return [sign * u * size, -sign * v * size];
-  };
+function maps(type, radius, up, rim) {
+  const compass = {place: (p) => around(directionOf[type](p), up).map((v) => v / sizeOf(rim)), disc: true};
   switch (type) {
     case 'line2d':
       return {
@@ -129,8 +146,8 @@ function maps(type, radius, up) {
         },
         caption: 'Every particle is a line: its direction, 0° to 180°, across; its distance from the middle upwards.',
       };
-    case 'plane': return {place: (p) => around(p), disc: true, caption: 'Every particle is a plane: the direction of its normal. Level ones are in the middle, upright ones at the rim.'};
-    case 'cylinder': return {place: (p) => around([p[3], p[4], p[5]]), disc: true, caption: 'Every particle is a cylinder: the direction of its axis. Upright ones are in the middle.'};
+    case 'plane': return {...compass, caption: `Every particle is a plane: the direction of its normal. Level ones are in the middle, at the rim they stand at ${rim}°.`};
+    case 'cylinder': return {...compass, caption: `Every particle is a cylinder: the direction of its axis, ${rim}° from upright at the rim.`};
     case 'circle2d':
       return {place: (p) => [p[0] / radius, -p[1] / radius], caption: 'Every particle is a circle: its centre.'};
     case 'sphere':
@@ -147,18 +164,18 @@ const trail = 8;  // steps that are still seen
 export class ParameterMap {
   /** `up`: {u, v, w}, two directions across the vertical and the vertical itself. */
   constructor(canvas, caption, search, radius, up) {
-    Object.assign(this, {canvas, caption, search, radius, up});
+    Object.assign(this, {canvas, caption, search, radius, up, rim: rimOf(search, up)});
   }
 
   /** Is there one for this search? */
   get possible() {
-    return this.search.steps.some((step) => maps(step.type, this.radius, this.up));
+    return this.search.steps.some((step) => maps(step.type, this.radius, this.up, this.rim));
   }
 
   draw(now) {
     const {context, width, height} = prepare(this.canvas);
     const steps = this.search.steps, current = steps[Math.min(now, steps.length - 1)];
-    const map = current && maps(current.type, this.radius, this.up);
+    const map = current && maps(current.type, this.radius, this.up, this.rim);
     if (!map) return;
     this.caption.textContent = map.caption;
     const half = map.disc ? [Math.min(width, height) / 2 - 4, Math.min(width, height) / 2 - 4] : [width / 2 - 4, height / 2 - 4];
@@ -173,9 +190,10 @@ export class ParameterMap {
 
   border(context, width, height, half, disc) {
     context.strokeStyle = variable('--line');
+    context.lineWidth = 1;
     context.beginPath();
     if (disc) {
-      for (const share of [1, Math.sqrt(1 - Math.cos(Math.PI / 4))]) {
+      for (const share of [1, sizeOf(this.rim / 2) / sizeOf(this.rim)]) {
         context.moveTo(width / 2 + share * half[0], height / 2);
         context.arc(width / 2, height / 2, share * half[0], 0, 2 * Math.PI);
       }
@@ -216,7 +234,7 @@ export class ParameterMap {
     }
     if (now >= this.search.steps.length) return;
     const [x, y] = at(current.best);
-    context.strokeStyle = variable('--accent');
+    context.strokeStyle = variable('--ink');
     context.lineWidth = 2;
     context.beginPath();
     context.arc(x, y, 7, 0, 2 * Math.PI);

@@ -26,11 +26,11 @@ export function residuals(cloud, models, centre) {
 /** Near is strong, three thresholds away is faint. */
 export const distanceColour = (distance, threshold) => ramp(1 - Math.min(distance / (3 * threshold), 1));
 
-/** Structure of the camera's picture within one colour. */
-function textured([r, g, b], rgb, i) {
-  if (!rgb) return [r, g, b];
+/** The camera's picture seen through a colour. */
+function textured(colour, rgb, i, strength) {
+  if (!rgb) return colour;
   const light = 0.5 + (0.3 * rgb[3 * i] + 0.59 * rgb[3 * i + 1] + 0.11 * rgb[3 * i + 2]) / 320;
-  return [r * light, g * light, b * light];
+  return colour.map((c, d) => strength * light * c + (1 - strength) * rgb[3 * i + d]);
 }
 
 function plain(rgb, i) {
@@ -46,7 +46,7 @@ function plain(rgb, i) {
  * the result, selected: {kind, k} or undefined}.
  */
 export function paint(out, layout, cloud, show, distances, threshold, background) {
-  const cached = new Map();
+  const cached = new Map(), things = Boolean(cloud.objects ?? cloud.popout);
   const known = (key, colour) => {
     if (!cached.has(key)) cached.set(key, colour());
     return cached.get(key);
@@ -60,14 +60,14 @@ export function paint(out, layout, cloud, show, distances, threshold, background
     } else if (show.by === 'distance') {
       colour = distanceColour(distances[i], threshold);
     } else if (thing > 0) {
-      colour = textured(known(-thing, () => objectColour(thing)), cloud.rgb, i);
+      colour = textured(known(-thing, () => objectColour(thing)), cloud.rgb, i, 0.72);
     } else if (visible) {
-      colour = textured(known(plane, () => modelColour(plane)), cloud.rgb, i);
+      colour = textured(known(plane, () => modelColour(plane)), cloud.rgb, i, things ? 0.5 : 0.72);
     } else {
       colour = plain(cloud.rgb, i);
     }
     const {selected} = show;
-    const out_of_it = selected && (selected.kind === 'model' ? plane !== selected.k || thing > 0 : thing !== selected.k);
+    const out_of_it = selected && (selected.kind === 'model' ? plane !== selected.k : thing !== selected.k);
     for (let d = 0; d < 3; ++d) out[4 * i + d] = Math.min(255, out_of_it ? 0.16 * colour[d] + 0.84 * background[d] : colour[d]);
     out[4 * i + 3] = 255;
   }

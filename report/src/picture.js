@@ -98,7 +98,8 @@ export class Picture {
   }
 
   boxes(context) {
-    const scale = 1 / this.image.every, size = Math.max(11, Math.round(this.image.width / 50));
+    const many = this.page.result.sois.length > 12;
+    const scale = 1 / this.image.every, size = Math.max(11, Math.round(this.image.width / (many ? 62 : 50)));
     context.font = `600 ${size}px system-ui, sans-serif`;
     context.textBaseline = 'bottom';
     this.page.result.sois.forEach((soi, k) => {
@@ -107,7 +108,7 @@ export class Picture {
       const words = soi.recognised[0]?.name ?? String(k + 1), wide = context.measureText(words).width + 8;
       context.strokeStyle = context.fillStyle = css(objectColour(k + 1));
       context.lineWidth = Math.max(1, this.image.width / 640);
-      context.strokeRect(x, y, w, h);
+      if (!many) context.strokeRect(x, y, w, h);
       const top = Math.max(y, size + 4);
       context.fillRect(x, top - size - 4, wide, size + 4);
       context.fillStyle = '#111';

@@ -15,7 +15,8 @@ export class Replay {
     this.now = this.end;
     this.swarms = [...new Set(search.steps.map((s) => s.swarm))];
     const time = $('time');
-    time.max = time.value = String(this.end);
+    time.max = String(this.end);
+    time.value = time.max;
     time.addEventListener('input', () => {
       this.pause();
       this.go(Number(time.value));

@@ -23,8 +23,10 @@ function startOf({about, cloud, layout}) {
   // A little to the side and above: from the eye itself a frame looks flat.
   const lean = eye.map((v, d) => v + 0.16 * side[d] + 0.1 * far * up[d]);
   const toward = lean.map((v, d) => v - layout.centre[d]), size = Math.hypot(...toward);
-  return {up, position: away(toward.map((v) => v / size), Math.max(1.6, Math.min(size / layout.radius, 1.9)))};
+  return {up, position: away(toward.map((v) => v / size), Math.max(1.8, Math.min(size / layout.radius, 2.1)))};
 }
+
+const most = 12;  // names of either kind at once; the largest things come first, and more would hide each other
 
 const rgbOf = (colour) => new THREE.Color(colour).toArray().map((v) => 255 * v);
 
@@ -64,7 +66,7 @@ export class SpaceView {
   makeModels() {
     const {result, about, layout, cloud} = this.page;
     const members = result.models.map(() => []);
-    for (let i = 0; i < cloud.count; ++i) if (cloud.planes[i] > 0 && thingOf(cloud, i) === 0) members[cloud.planes[i] - 1]?.push(i);
+    for (let i = 0; i < cloud.count; ++i) if (cloud.planes[i] > 0) members[cloud.planes[i] - 1]?.push(i);
     this.shapes = result.models.map((model, k) => {
       const shape = modelShape(model.type, relative(model, about.centre), modelColour(k + 1), layout.positions, members[k], result.threshold);
       this.view.scene.add(shape);
@@ -75,7 +77,7 @@ export class SpaceView {
   makeSpheres() {
     const {result, about} = this.page;
     this.spheres = result.sois.map((soi, k) => {
-      const sphere = ball(soi.centre.map((v, d) => v - about.centre[d]), soi.radius, objectColour(k + 1));
+      const sphere = ball(soi.centre.map((v, d) => v - about.centre[d]), soi.radius, objectColour(k + 1), result.sois.length > most ? 0.07 : 0.14);
       const up = about.up ?? [0, 0, 1];
       sphere.userData.anchor = soi.centre.map((v, d) => v - about.centre[d] + soi.radius * up[d]);
       this.view.scene.add(sphere);
@@ -85,11 +87,10 @@ export class SpaceView {
 
   /** Numbers of models and names of things, that follow what they belong to. */
   makeTags() {
-    const most = 60;
-    this.tags = [
-      ...this.shapes.map((shape, k) => ({shape, words: String(k + 1), colour: modelColour(k + 1), kind: 'model', k: k + 1})),
-      ...this.spheres.map((shape, k) => ({shape, words: thingName(this.page.result.sois[k], k).replace(/^thing /, ''), colour: objectColour(k + 1), kind: 'thing', k: k + 1})),
-    ].filter(({shape}) => shape.userData.anchor).slice(0, most);
+    const {about} = this.page;
+    const models = this.shapes.map((shape, k) => ({shape, words: about.kind === 'perceive' ? `plane ${k + 1}` : String(k + 1), colour: modelColour(k + 1), kind: 'model', k: k + 1}));
+    const things = this.spheres.map((shape, k) => ({shape, words: thingName(this.page.result.sois[k], k).replace(/^thing /, ''), colour: objectColour(k + 1), kind: 'thing', k: k + 1}));
+    this.tags = [...models, ...things].filter(({shape}) => shape.userData.anchor);
     for (const tag of this.tags) {
       const [r, g, b] = tag.colour;
       tag.element = make('span', {tag: css(tag.colour)}, tag.words);
@@ -102,7 +103,7 @@ export class SpaceView {
   placeTags() {
     for (const {shape, element, kind, k} of this.tags) {
       const {selected} = this;
-      const wanted = this.state.labels && (kind === 'model' ? this.modelShown(k) : this.replay.atEnd) && (!selected || (selected.kind === kind && selected.k === k));
+      const wanted = this.state.labels && (kind === 'model' ? this.modelShown(k) : this.replay.atEnd) && (selected ? selected.kind === kind && selected.k === k : k <= most);
       const at = wanted ? this.view.toScreen(shape.userData.anchor.map((v, d) => v + shape.position.getComponent(d))) : undefined;
       element.hidden = !at;
       if (at) element.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, -50%)`;
@@ -169,7 +170,7 @@ export class SpaceView {
     if (this.replay.atEnd || this.page.layout.pairs) return;
     const step = this.page.search.steps[this.replay.now], {box} = this.page.layout;
     const most = Math.max(1, ...step.shares);
-    this.flying = [swarm(step, box, (share) => ramp(share / most)), best(step, box, rgbOf(variable('--accent')).map(Math.round))];
+    this.flying = [swarm(step, box, (share) => ramp(share / most)), best(step, box, rgbOf(variable('--ink')))];
     this.view.scene.add(...this.flying);
   }
 

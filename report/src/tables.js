@@ -26,7 +26,7 @@ export function head({about, result}) {
   }
   const explained = result.models.reduce((sum, m) => sum + m.inliers, 0);
   facts.push(
-    fact('explained', result.input.finite > 0 ? `${((100 * explained) / result.input.finite).toFixed(1)} %` : '–', 'of the points'),
+    fact('explained', result.input.finite > 0 ? `${((100 * explained) / result.input.finite).toFixed(1)} %` : '–', 'of points'),
     fact('threshold τ', short(result.threshold, 3), about.kind === 'perceive' ? 'm' : ''),
     fact('time', ms(result.timing_ms.total), 'ms'),
     fact('back end', result.backend.name),
