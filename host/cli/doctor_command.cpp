@@ -16,6 +16,7 @@
 
 #include <swarmfit/backend.hpp>
 #include <swarmfit/fit.hpp>
+#include <swarmfit/report.hpp>
 #include <swarmfit/version.hpp>
 
 #include "host/cli/commands.hpp"
@@ -176,6 +177,13 @@ Finding check_cache() {
           fmt::format("sudo chown -R $USER {}", nearest.string())};
 }
 
+Finding check_pages() {
+  if (const auto can = check_report(); !can)
+    return {State::lacking, "reports", can.error().message,
+            "tools/setup.sh --report && npm ci --prefix report, then configure and build anew"};
+  return {State::good, "reports", "--report writes pages", ""};
+}
+
 int run(const std::string& backend) {
   bool works = false;
   std::vector<Finding> findings = try_a_fit(backend, works);
@@ -183,6 +191,7 @@ int run(const std::string& backend) {
   append(check_devices());
   append(check_vulkan());
   findings.push_back(check_cache());
+  findings.push_back(check_pages());
   findings.push_back({State::good, "libraries", SWARMFIT_CLI_LIBRARIES, ""});
   findings.push_back({State::good, "build", SWARMFIT_CLI_BUILD, ""});
 

@@ -186,12 +186,12 @@ Command add_fit(CLI::App& app) {
          "input", arguments->input,
          ".pcd .ply .xyz .csv (x,y or x,y,z or x1,y1,x2,y2; a header is optional, a column named label is ignored), or a 16-bit depth .png")
       ->type_name("INPUT");
-  sub->add_option("--model", arguments->option, "What to find, with INPUT alone")->type_name("MODEL")->group("How models are found");
+  sub->add_option("--model", arguments->option, "What to find, with INPUT alone")->type_name("MODEL")->group(FitFlags::kGroup);
   sub->add_option("--normal", arguments->normal, "Only models whose normal is near this direction (line2d: X,Y)")
       ->type_name("X,Y,Z")
-      ->group("How models are found");
-  sub->add_option("--within", arguments->within, "How near: within this angle [11.5]")->type_name("DEG")->group("How models are found");
-  arguments->vertical.add_to(*sub, "How models are found", "with it or --gravity, only planes that are level");
+      ->group(FitFlags::kGroup);
+  sub->add_option("--within", arguments->within, "How near: within this angle [11.5]")->type_name("DEG")->group(FitFlags::kGroup);
+  arguments->vertical.add_to(*sub, FitFlags::kGroup, "with it or --gravity, only planes that are level");
   arguments->fit.add_to(*sub);
   arguments->camera.add_to(*sub);
   arguments->output.add_to(*sub, "A folder for result.json and labels.txt");

@@ -20,7 +20,8 @@ ReportNotes report_notes(const CLI::App& subcommand, const std::string& inputs) 
     if (option->get_lnames().empty() || option->get_group() == OutputFlags::kGroup || option->get_lnames().front() == "help") continue;
     const bool given = option->count() > 0;
     const std::string value = given ? fmt::format("{}", fmt::join(option->results(), " ")) : option->get_default_str();
-    if (given || !value.empty()) notes.settings.push_back({"--" + option->get_lnames().front(), value, given});
+    const bool of_interest = given || (!value.empty() && option->get_group() == FitFlags::kGroup);
+    if (of_interest) notes.settings.push_back({"--" + option->get_lnames().front(), value, given});
   }
   return notes;
 }

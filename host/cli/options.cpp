@@ -68,7 +68,7 @@ Expected<std::vector<double>> parse_list(const std::string& option, const std::s
 }
 
 void FitFlags::add_to(CLI::App& app) {
-  const char* group = "How models are found";
+  const char* group = kGroup;
   app.add_option("--threshold", threshold,
                  "Inliers are within this distance, in the data's unit; auto: from the data's own noise [plane: 0.01, else auto]")
       ->type_name("VALUE|auto")

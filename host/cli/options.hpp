@@ -25,6 +25,7 @@ Expected<> must_be_positive(const std::string& option, const std::optional<doubl
 
 /// How models are found: given to fit, perceive and demo.
 struct FitFlags {
+  static constexpr const char* kGroup = "How models are found";
   std::string threshold, preset = "fast", deflation, backend = "auto", particles, iterations, stall, lambda, min_inliers, max_models,
                          time_budget, threads = "0", seed = "1";
 

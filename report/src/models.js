@@ -65,11 +65,12 @@ const words = {
 
 export const called = (type, many = false) => words[type][many ? 1 : 0];
 
-/** "5 planes", "2 planes and 1 sphere". */
+/** "5 planes", "2 planes, 1 sphere and 1 cylinder". */
 export function counted(models) {
   const counts = new Map();
   for (const {type} of models) counts.set(type, (counts.get(type) ?? 0) + 1);
-  return [...counts].map(([type, n]) => `${n} ${called(type, n !== 1)}`).join(' and ') || 'no model';
+  const parts = [...counts].map(([type, n]) => `${n} ${called(type, n !== 1)}`), last = parts.pop() ?? 'no model';
+  return parts.length > 0 ? `${parts.join(', ')} and ${last}` : last;
 }
 
 /** A number in at most `digits` significant ones. */

@@ -48,7 +48,7 @@ export class Shading {
         pixel: {value: new THREE.Vector2()},
         near: {value: 1},
         far: {value: 2},
-        strength: {value: 55},
+        strength: {value: 40},
       },
     });
     this.scene = new THREE.Scene();

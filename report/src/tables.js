@@ -19,7 +19,8 @@ export function head({about, result}) {
   const grid = result.input.height > 1 ? `, ${result.input.width} × ${result.input.height}` : '';
   $('subtitle').textContent = `${whole(result.input.points)} points${grid}, ${whole(result.input.finite)} of them finite; ${result.stop_reason}`;
   const fact = (name, value, unit) => make('div', {}, make('dt', {}, name), make('dd', {title: `${value} ${unit ?? ''}`}, value, unit ? make('small', {}, ' ' + unit) : ''));
-  const facts = [fact('found', counted(result.models))];
+  const kinds = new Set(result.models.map((m) => m.type)).size;
+  const facts = [fact('found', kinds > 1 ? `${result.models.length} models` : counted(result.models))];
   if (about.kind === 'perceive') {
     const carry = result.models.filter((m) => m.supporting).length;
     facts.push(fact('carry things', String(carry), called('plane', carry !== 1)), fact('things', String(result.sois.length)));
@@ -123,7 +124,7 @@ export function reproduction({about, result}) {
     ['seed', String(result.seed)],
     ['threshold τ', short(result.threshold, 6)],
     ...(about.up ? [['up', `${list(about.up, 3)} by ${about.vertical_source}`]] : []),
-    ['steps', whole(about.iterations)],
+    ['steps to these models', whole(about.iterations)],
     ['evaluations', `${whole(about.evaluations)}, ${(100 * about.points_touched).toFixed(0)} % of the points touched`],
     ['stopped', result.stop_reason],
   ].map((entry) => row(entry, false)));

@@ -73,7 +73,7 @@ export class View {
 
   /** How far apart points are, roughly: they lie on surfaces. */
   spacing() {
-    return (1.9 * this.layout.radius) / Math.sqrt(Math.max(this.layout.drawn, 1));
+    return (1.7 * this.layout.radius) / Math.sqrt(Math.max(this.layout.drawn, 1));
   }
 
   setUpControls() {
