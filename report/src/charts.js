@@ -38,16 +38,29 @@ export class FitnessChart {
     const count = Math.max(1, this.search.steps.length - 1);
     const x = (t) => frame.left + (t / count) * (width - frame.left - frame.right);
     const y = (share) => height - frame.bottom - (share / this.most) * (height - frame.top - frame.bottom);
-    this.axes(context, width, height, x, y);
-    this.particles(context, x, y);
+    context.drawImage(this.backdrop(width, height, x, y), 0, 0, width, height);
     this.curves(context, x, y, now);
-    this.founds(context, x, height);
+    this.founds(context, x);
     context.strokeStyle = variable('--accent');
     context.lineWidth = 1.5;
     context.beginPath();
     context.moveTo(x(Math.min(now, count)), frame.top - 8);
     context.lineTo(x(Math.min(now, count)), height - frame.bottom);
     context.stroke();
+  }
+
+  /** What stays the same from step to step: axes, and a dot for each particle. */
+  backdrop(width, height, x, y) {
+    const key = `${width} ${height} ${this.canvas.width} ${variable('--soft')}`;
+    if (key === this.drawn) return this.still;
+    this.drawn = key;
+    this.still = new OffscreenCanvas(this.canvas.width, this.canvas.height);
+    const context = this.still.getContext('2d');
+    context.scale(this.canvas.width / width, this.canvas.height / height);
+    context.font = this.canvas.getContext('2d').font;
+    this.axes(context, width, height, x, y);
+    this.particles(context, x, y);
+    return this.still;
   }
 
   axes(context, width, height, x, y) {

@@ -35,9 +35,10 @@ const compose = {
 };
 
 export class Shading {
-  constructor(renderer) {
+  /** `samples` a pixel: a sharp screen needs one. */
+  constructor(renderer, samples) {
     this.renderer = renderer;
-    this.target = new THREE.WebGLRenderTarget(4, 4, {samples: 4, depthTexture: new THREE.DepthTexture(4, 4)});
+    this.target = new THREE.WebGLRenderTarget(4, 4, {samples, depthTexture: new THREE.DepthTexture(4, 4)});
     this.material = new THREE.ShaderMaterial({
       ...compose,
       depthTest: false,

@@ -43,7 +43,7 @@ export class View {
     // The controls learn which way is up when they are made.
     this.camera.up.set(...(layout.flat ? [0, 1, 0] : start.up));
     this.controls = new OrbitControls(this.camera, canvas);
-    this.shading = layout.flat ? undefined : new Shading(this.renderer);
+    this.shading = layout.flat ? undefined : new Shading(this.renderer, this.pixelRatio > 1.5 ? 0 : 4);
     this.afterRender = [];
     this.makePoints();
     this.setUpControls();

@@ -57,3 +57,40 @@ export function pairs() {
   for (let i = 0; i < 80; ++i) rows.push([640 * next(), 480 * next(), 640 * next(), 480 * next()]);
   return csv('x1,y1,x2,y2', rows);
 }
+
+const add = (a, b, times) => a.map((v, d) => v + times * b[d]);
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+
+/** Where a ray leaves the free air of a table with a box and a ball on it, and the colour there. */
+function hit(from, along) {
+  let best = {t: -from[2] / along[2], colour: [168, 140, 110]};
+  if (!(best.t > 0)) best = {t: Infinity};
+  const ball = [0.16, 0.02, 0.09], radius = 0.09, off = add(from, ball, -1);
+  const b = dot(off, along), root = b * b - dot(off, off) + radius * radius;
+  if (root > 0 && -b - Math.sqrt(root) < best.t) best = {t: -b - Math.sqrt(root), colour: [40, 90, 200]};
+  const low = [-0.26, -0.06, 0], high = [-0.1, 0.08, 0.17];
+  const [near, far] = [0, 1, 2].reduce(([n, f], d) => {
+    const [s, e] = [(low[d] - from[d]) / along[d], (high[d] - from[d]) / along[d]];
+    return [Math.max(n, Math.min(s, e)), Math.min(f, Math.max(s, e))];
+  }, [0, Infinity]);
+  if (near < far && near < best.t) best = {t: near, colour: [190, 50, 40]};
+  return best;
+}
+
+/** A depth camera's frame of that table, as an organised coloured .pcd. */
+export function frame() {
+  const next = random(17), width = 160, height = 120, focal = 140;
+  const eye = [0, -0.75, 0.6], forward = [0, -eye[1], -eye[2]].map((v) => v / Math.hypot(eye[1], eye[2]));
+  const right = [1, 0, 0], down = [0, forward[2], -forward[1]];
+  const rows = [];
+  for (let v = 0; v < height; ++v) {
+    for (let u = 0; u < width; ++u) {
+      const [x, y] = [(u - 79.5) / focal, (v - 59.5) / focal], size = Math.hypot(x, y, 1);
+      const ray = add(add(forward, right, x), down, y).map((c) => c / size);
+      const {t, colour} = hit(eye, ray), depth = t / size + 0.001 * (next() - 0.5);
+      if (!(depth < 2)) rows.push('nan nan nan 0');
+      else rows.push(`${(x * depth).toFixed(5)} ${(y * depth).toFixed(5)} ${depth.toFixed(5)} ${colour[0] * 65536 + colour[1] * 256 + colour[2]}`);
+    }
+  }
+  return `# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH ${width}\nHEIGHT ${height}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS ${width * height}\nDATA ascii\n${rows.join('\n')}\n`;
+}
