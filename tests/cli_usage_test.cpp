@@ -84,6 +84,8 @@ TEST(CliUsage, PerceiveTakesOneKindOfInput) {
   expect_refusal(folder, {"perceive", "--left", "l.png", "--right", "r.png"}, 2, "--calib");
   expect_refusal(folder, {"perceive", "--color", "c.png", "--intrinsics", "1,1,1,1"}, 2, "--depth");
   expect_refusal(folder, {"perceive", "--color", "c.png", "--depth", "d.png"}, 2, "--intrinsics");
+  for (const char* value : {"", "grabcut", "Fixation"})
+    expect_refusal(folder, {"perceive", "c.pcd", "--segmentation", value}, 2, "--segmentation");
   expect_refusal(folder, {"perceive", "c.pcd", "--gravity", "0,0,0"}, 2, "--gravity");
   expect_refusal(folder, {"perceive", "c.pcd", "--gravity", "0,nan,0"}, 2, "--gravity");
   expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "91"}, 2, "--camera-tilt");

@@ -193,6 +193,11 @@ Expected<Eigen::Vector3d> VerticalFlags::axis() const {
 void SceneFlags::add_to(CLI::App& app) {
   const char* group = "What is known of the scene";
   vertical.add_to(app, group, "with neither, the dominant plane is the ground");
+  app.add_option("--segmentation", segmentation,
+                 "How things are outlined in the image: graphcut labels pixels, fixation draws a contour around each thing's centre")
+      ->type_name("graphcut|fixation")
+      ->group(group)
+      ->capture_default_str();
   app.add_option("--gallery", gallery, "Names for what is found: one image, or one folder of images, a name")
       ->type_name("DIR")
       ->group(group);
@@ -200,6 +205,9 @@ void SceneFlags::add_to(CLI::App& app) {
 
 Expected<> SceneFlags::apply(PerceiveOptions& options) const {
   if (auto ok = vertical.apply(options); !ok) return ok;
+  if (segmentation != "graphcut" && segmentation != "fixation")
+    return invalid(fmt::format("--segmentation: {}, must be graphcut or fixation", segmentation));
+  options.segmentation = segmentation == "graphcut" ? Segmentation::graphcut : Segmentation::fixation;
   options.gallery = gallery;
   return options.validate();
 }

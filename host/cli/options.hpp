@@ -57,10 +57,10 @@ struct VerticalFlags {
   Expected<Eigen::Vector3d> axis() const;
 };
 
-/// Which way is up, and what is known by name: given to perceive and demo.
+/// Which way is up, how things are outlined, and what is known by name: given to perceive and demo.
 struct SceneFlags {
   VerticalFlags vertical;
-  std::string gallery;
+  std::string segmentation = "graphcut", gallery;
 
   void add_to(CLI::App& app);
   Expected<> apply(PerceiveOptions& options) const;

@@ -82,6 +82,7 @@ SoiColours soi_colours(const SegmentationInput& input, const PixelGrid& grid, co
 
 std::vector<std::uint16_t> segment_objects(const SegmentationInput& input, const PerceiveOptions& options) {
   if (input.sois.empty()) return std::vector<std::uint16_t>(input.popout.size(), 0);
+  if (options.segmentation == Segmentation::fixation) return segment_fixation(input, options);
   return options.fit.preset == Preset::paper ? segment_paper(input, options) : segment_fused(input, options);
 }
 

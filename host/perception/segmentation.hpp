@@ -1,4 +1,4 @@
-// Outlines of the objects in the image: a graph cut over three labels (object, background, uncertain) for each space of interest.
+// Outlines of the objects in the image: by graph cuts over three labels (object, background, uncertain), or by contours around fixations.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The frame as the two segmentations read it.
+// The frame as the segmentations read it.
 #pragma once
 
 #include <cmath>
@@ -62,6 +62,12 @@ struct SoiColours {
 SoiColours soi_colours(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, int neighbours, int bits,
                        std::size_t largest);
 
+/// What it costs the pixels of a region to be object (colour and distance, in [0, 2]) and to be background (colour, in [0, 1]).
+struct PaperCosts {
+  cv::Mat1d object, background;
+};
+PaperCosts paper_costs(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, const PerceiveOptions& options);
+
 /// The paper's cut, one SOI after another. segmentation_paper.cpp
 std::vector<std::uint16_t> segment_paper(const SegmentationInput& input, const PerceiveOptions& options);
 /// Weights of the fused cut, chosen on labelled Kinect frames.
@@ -83,5 +89,17 @@ struct FusedTuning {
 
 /// One cut for all SOIs, with what the depth knows. segmentation_fused.cpp
 std::vector<std::uint16_t> segment_fused(const SegmentationInput& input, const PerceiveOptions& options, const FusedTuning& tuning = {});
+
+/// Where a contour is drawn around.
+struct Fixation {
+  cv::Point at;      ///< [px]
+  double clear = 0;  ///< [px] to the border of the piece it lies in
+  cv::Rect rect;     ///< what the contour may fill
+};
+/// One for each piece of a SOI's group in the image: what stands before a thing may part it.
+std::vector<Fixation> find_fixations(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region);
+
+/// A closed contour around each fixation. segmentation_fixation.cpp
+std::vector<std::uint16_t> segment_fixation(const SegmentationInput& input, const PerceiveOptions& options);
 
 }  // namespace swarmfit::perception

@@ -62,18 +62,15 @@ class PaperCut {
   common::PottsEnergy::Cost most_of_boundaries() const { return 4 * (straight_ + slanted_); }
 
   void weigh_pixels(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, const PerceiveOptions& options) {
-    SoiColours colours = soi_colours(input, grid, region, options.colour_neighbours, kColourBits, kLargestSample);
+    const PaperCosts weighed = paper_costs(input, grid, region, options);
     const auto uncertain_cost = to_cost(options.uncertain_cost > 0 ? options.uncertain_cost : kUncertainCost);
-    const double reach = kSpatialReach * std::min(width_, height_);
     costs_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
     labels_.resize(costs_.size());
     for (int y = 0; y < height_; ++y)
       for (int x = 0; x < width_; ++x) {
-        const std::uint8_t* rgb = grid.rgb(grid.index(region.rect.x + x, region.rect.y + y));
-        const double spatial = std::min(1.0, static_cast<double>(region.distance(y, x)) / reach);
         Costs& cost = costs_[at(x, y)];
-        cost[background] = to_cost(static_cast<double>(colours.background.cost(rgb[0], rgb[1], rgb[2])));
-        cost[object] = to_cost(static_cast<double>(colours.object.cost(rgb[0], rgb[1], rgb[2])) + spatial);
+        cost[background] = to_cost(weighed.background(y, x));
+        cost[object] = to_cost(weighed.object(y, x));
         cost[uncertain] = uncertain_cost;
         const auto cheapest = std::min_element(cost.begin(), cost.end());
         const auto rivals =
@@ -114,6 +111,20 @@ class PaperCut {
 };
 
 }  // namespace
+
+PaperCosts paper_costs(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, const PerceiveOptions& options) {
+  SoiColours colours = soi_colours(input, grid, region, options.colour_neighbours, kColourBits, kLargestSample);
+  const double reach = kSpatialReach * std::min(region.rect.width, region.rect.height);
+  PaperCosts costs{cv::Mat1d(region.rect.size()), cv::Mat1d(region.rect.size())};
+  for (int y = 0; y < region.rect.height; ++y)
+    for (int x = 0; x < region.rect.width; ++x) {
+      const std::uint8_t* rgb = grid.rgb(grid.index(region.rect.x + x, region.rect.y + y));
+      const double spatial = std::min(1.0, static_cast<double>(region.distance(y, x)) / reach);
+      costs.background(y, x) = static_cast<double>(colours.background.cost(rgb[0], rgb[1], rgb[2]));
+      costs.object(y, x) = static_cast<double>(colours.object.cost(rgb[0], rgb[1], rgb[2])) + spatial;
+    }
+  return costs;
+}
 
 std::vector<std::uint16_t> segment_paper(const SegmentationInput& input, const PerceiveOptions& options) {
   const PixelGrid grid(input.frame);

@@ -131,6 +131,10 @@ bool set(PerceiveOptions& o, std::string_view name, nb::handle value) {
     o.min_soi_points = number<std::size_t>(name, value);
   } else if (name == "soi_margin") {
     real(o.soi_margin);
+  } else if (name == "segmentation") {
+    const std::string given = text(name, value);
+    if (given != "graphcut" && given != "fixation") refuse(name, value, "'graphcut' or 'fixation'");
+    o.segmentation = given == "graphcut" ? Segmentation::graphcut : Segmentation::fixation;
   } else if (name == "colour_neighbours") {
     o.colour_neighbours = number<int>(name, value);
   } else if (name == "uncertain_cost") {

@@ -116,6 +116,7 @@ _PERCEIVE_OPTIONS = """
         flood_step: neighbours in one group are at most this far apart [m].
         min_soi_points: smaller groups are debris (for 640 x 480; scaled by the image's size).
         soi_margin: the sphere is larger than the group by this factor.
+        segmentation: how things are outlined, by "graphcut" or by "fixation", a contour around each thing's centre.
         colour_neighbours, uncertain_cost, smoothness: of the outlines' graph cut.
         gallery: a folder of names for what is found: one image, or one folder of images, a name.
 """

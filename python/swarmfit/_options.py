@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         flood_step: SupportsFloat | None
         min_soi_points: SupportsIndex | None
         soi_margin: SupportsFloat | None
+        segmentation: str | None
         colour_neighbours: SupportsIndex | None
         uncertain_cost: SupportsFloat | None
         smoothness: SupportsFloat | None

@@ -94,5 +94,7 @@ def test_errors(room: swarmfit.Cloud) -> None:
         swarmfit.perceive(None, np.zeros(3), (1, 1, 1, 1))
     with pytest.raises(swarmfit.InvalidOption, match="horizontal"):
         swarmfit.perceive_cloud(room, horizontal_angle=7)
+    with pytest.raises(swarmfit.InvalidOption, match="segmentation is 'grabcut', must be 'graphcut' or 'fixation'"):
+        swarmfit.Perceiver(segmentation="grabcut")
     with pytest.raises(TypeError, match="unknown option 'model'"):
         swarmfit.Perceiver(model="plane")  # type: ignore[call-arg]

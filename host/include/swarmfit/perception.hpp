@@ -19,6 +19,12 @@
 
 namespace swarmfit {
 
+/// How outlines are found in the image.
+enum class Segmentation {
+  graphcut,  ///< labels for pixels: object, background, uncertain; as FitOptions::preset has it
+  fixation   ///< a closed contour around each space of interest's centre, after Mishra, Aloimonos and Cheong 2009
+};
+
 struct PerceiveOptions {
   FitOptions fit;                          ///< how planes are found; model is plane, prior is set by perception
   std::optional<Eigen::Vector3d> gravity;  ///< direction of gravity in the cloud's frame; length does not matter, not zero
@@ -31,6 +37,7 @@ struct PerceiveOptions {
   double flood_step = 0.02;          ///< [m] neighbours in the flood fill are at most this far apart
   std::size_t min_soi_points = 300;  ///< smaller groups are debris (for a 640 x 480 frame; scaled by the image's size)
   double soi_margin = 1.15;          ///< the bounding sphere is larger than the group by this factor, >= 1
+  Segmentation segmentation = Segmentation::graphcut;
   int colour_neighbours = 0;         ///< K of the colour cost; 0 takes it from the sample's size
   double uncertain_cost = 0;         ///< fixed cost of the third label, in (0, 1); 0: the default of the preset
   double smoothness = 0;             ///< weight of the boundary term, > 0; 0: the default of the preset
