@@ -13,6 +13,7 @@ using swarmfit::tests::run_swarmfit;
 using swarmfit::tests::TemporaryFolder;
 
 const char* const kFiles[] = {"fig2-flight.svg", "fig3-global-best.svg", "fig6-iterations.svg", "fig7-several-lines.svg"};
+const char* const kPictures[] = {"fig4-planes.jpg", "fig5-segmentation.jpg", "fixation.jpg"};
 
 TEST(CliFigures, AreWholeAndFollowFromTheSeed) {
   const TemporaryFolder folder;
@@ -32,15 +33,27 @@ TEST(CliFigures, AreWholeAndFollowFromTheSeed) {
     EXPECT_EQ(svg, contents(folder / "again" / file)) << file;
     EXPECT_NE(svg, contents(folder / "other" / file)) << file;
   }
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "a/b"), fs::directory_iterator()), 4);
+  for (const char* file : kPictures) {
+    const std::string jpeg = contents(folder / "a/b" / file);
+    EXPECT_TRUE(jpeg.starts_with("\xff\xd8\xff")) << file;
+    EXPECT_TRUE(jpeg.ends_with("\xff\xd9")) << file;
+    EXPECT_LT(jpeg.size(), 200000U) << file;
+    EXPECT_NE(outcome.out.find(file), std::string::npos) << outcome.out;
+    EXPECT_EQ(jpeg, contents(folder / "again" / file)) << file;
+    EXPECT_NE(jpeg, contents(folder / "other" / file)) << file;
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder / "a/b"), fs::directory_iterator()), 7);
 }
 
 TEST(CliFigures, RefusedBeforeAnyWork) {
   const TemporaryFolder folder;
   folder.put("file", "");
+  folder.put("c.xyz", "0 0 1\n1 0 1\n0 1 1\n");
   expect_refusal(folder, {"figures"}, 2, "--out");
   expect_refusal(folder, {"figures", "--out", "f", "--seed", "-1"}, 2, "--seed");
   expect_refusal(folder, {"figures", "--out", "f", "more"}, 2, "more");
+  expect_refusal(folder, {"figures", "--out", "f", "--frame", "none.pcd"}, 3, "none.pcd");
+  expect_refusal(folder, {"figures", "--out", "f", "--frame", "c.xyz"}, 3, "no image grid");
   expect_refusal(folder, {"figures", "--out", ""}, 3, "empty");
   expect_refusal(folder, {"figures", "--out", "file"}, 3, "not a folder");
   expect_refusal(folder, {"figures", "--out", "file/below"}, 3, "not a folder");
