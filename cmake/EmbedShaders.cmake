@@ -54,3 +54,18 @@ vec4 residuals(uint model, const vec4 x[kMaxColumns], const float k[kCoefficient
 inline constexpr const char* kShaderModels[] = {@names@};
 ")
 endfunction()
+
+# swarmfit_write_glsl_sources(folder file...): embedded/glsl_sources.h, the files' text for a compiler at run time.
+function(swarmfit_write_glsl_sources folder)
+  set(entries "")
+  foreach(file IN LISTS ARGN)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${file})
+    file(READ ${CMAKE_CURRENT_SOURCE_DIR}/${file} text)
+    string(APPEND entries "    {\"${file}\", R\"glsl(${text})glsl\"},\n")
+  endforeach()
+  file(CONFIGURE OUTPUT ${folder}/embedded/glsl_sources.h @ONLY CONTENT "// Written by CMake from shaders/CMakeLists.txt.
+#pragma once
+inline constexpr GlslSource kGlslSources[] = {
+@entries@};
+")
+endfunction()

@@ -15,4 +15,17 @@ if(SWARMFIT_VULKAN)
   find_package(Vulkan REQUIRED)
 endif()
 
+# As a library, for models that users bring along as GLSL at run time.
+set(SWARMFIT_GLSLANG_TARGETS)
+if(SWARMFIT_VULKAN)
+  find_package(glslang CONFIG QUIET)
+  if(TARGET glslang::SPIRV AND TARGET glslang::glslang-default-resource-limits)
+    find_package(SPIRV-Tools CONFIG QUIET)
+    find_package(SPIRV-Tools-opt CONFIG QUIET)
+    set(SWARMFIT_GLSLANG_TARGETS glslang::SPIRV glslang::glslang-default-resource-limits)
+  else()
+    message(STATUS "Models that users bring along will not run on Vulkan: glslang's library was not found (glslang-dev)")
+  endif()
+endif()
+
 list(TRANSFORM SWARMFIT_OPENCV_COMPONENTS PREPEND opencv_ OUTPUT_VARIABLE SWARMFIT_OPENCV_TARGETS)

@@ -31,7 +31,11 @@ install(FILES ${PROJECT_BINARY_DIR}/swarmfitConfig.cmake ${PROJECT_BINARY_DIR}/s
 file(RELATIVE_PATH SWARMFIT_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" SWARMFIT_PC_PREFIX "${SWARMFIT_PC_PREFIX}")
 list(TRANSFORM SWARMFIT_OPENCV_TARGETS PREPEND " -l" OUTPUT_VARIABLE inside)
-string(JOIN "" inside " -lfmt -ltbb -lhwy -llzf" ${inside} " -ldl -lpthread -lstdc++ -lm")
+if(SWARMFIT_GLSLANG_TARGETS)
+  set(glslang " -lSPIRV -lglslang -lMachineIndependent -lOSDependent -lOGLCompiler -lGenericCodeGen"
+              " -lglslang-default-resource-limits -lSPIRV-Tools-opt -lSPIRV-Tools")
+endif()
+string(JOIN "" inside " -lfmt -ltbb -lhwy -llzf" ${inside} ${glslang} " -ldl -lpthread -lstdc++ -lm")
 if(BUILD_SHARED_LIBS)
   set(SWARMFIT_PC_LIBS)
   set(SWARMFIT_PC_LIBS_PRIVATE "${inside}")

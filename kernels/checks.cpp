@@ -14,6 +14,19 @@ constexpr std::size_t kMaxModels = 65534;
 
 tl::unexpected<Failure> invalid(std::string message) { return fail(Failure::Kind::invalid, std::move(message)); }
 
+/// The traits of a kind that the evaluator has and points of this dimension can be fitted by.
+Result<ModelTraits> check_kind(ModelKind kind, int dimension, const OwnModel* own) {
+  if (kind == ModelKind::own && own == nullptr) return invalid("the model's kind is own, must be one that is built in");
+  if (kind != ModelKind::own && own != nullptr) {
+    return invalid(fmt::format("the model's kind is {}, must be own: the evaluator was made for {}", traits(kind).name, own->name));
+  }
+  const ModelTraits t = own != nullptr ? own->traits() : traits(kind);
+  if (t.dimension != dimension) {
+    return invalid(fmt::format("{} is fitted to points of dimension {}, but points.dimension is {}", t.name, t.dimension, dimension));
+  }
+  return t;
+}
+
 }  // namespace
 
 Result<> check_points(const PointsView& points) {
@@ -40,20 +53,17 @@ Result<> check_size(const char* field, std::size_t value, std::size_t wanted) {
   return {};
 }
 
-Result<> check_model(const ModelView& model, int dimension) {
-  const ModelTraits& t = traits(model.kind);
-  if (t.dimension != dimension) {
-    return invalid(fmt::format("{} is fitted to points of dimension {}, but points.dimension is {}", t.name, t.dimension, dimension));
-  }
-  return check_size("model.parameters.size()", model.parameters.size(), static_cast<std::size_t>(t.parameter_count));
+Result<> check_model(const ModelView& model, int dimension, const OwnModel* own) {
+  const auto t = check_kind(model.kind, dimension, own);
+  if (!t) return tl::unexpected(t.error());
+  return check_size("model.parameters.size()", model.parameters.size(), static_cast<std::size_t>(t->parameter_count));
 }
 
-Result<> check_swarm(const SwarmView& swarm, int dimension, std::span<const float> cutoffs, std::span<const float> costs) {
-  const ModelTraits& t = traits(swarm.kind);
-  if (t.dimension != dimension) {
-    return invalid(fmt::format("{} is fitted to points of dimension {}, but points.dimension is {}", t.name, t.dimension, dimension));
-  }
-  const std::size_t wanted = swarm.count * static_cast<std::size_t>(t.parameter_count);
+Result<> check_swarm(const SwarmView& swarm, int dimension, std::span<const float> cutoffs, std::span<const float> costs,
+                     const OwnModel* own) {
+  const auto t = check_kind(swarm.kind, dimension, own);
+  if (!t) return tl::unexpected(t.error());
+  const std::size_t wanted = swarm.count * static_cast<std::size_t>(t->parameter_count);
   if (auto size = check_size("swarm.parameters.size()", swarm.parameters.size(), wanted); !size) return size;
   if (auto size = check_size("costs.size()", costs.size(), swarm.count); !size) return size;
   if (!cutoffs.empty()) return check_size("cutoffs.size()", cutoffs.size(), swarm.count);
@@ -61,10 +71,10 @@ Result<> check_swarm(const SwarmView& swarm, int dimension, std::span<const floa
 }
 
 Result<> check_assign(std::span<const ModelView> models, int dimension, std::size_t points, std::span<const float> tolerance,
-                      std::span<const std::uint16_t> labels) {
+                      std::span<const std::uint16_t> labels, const OwnModel* own) {
   if (models.size() > kMaxModels) return invalid(fmt::format("models.size() is {}, must be <= {}", models.size(), kMaxModels));
   for (const ModelView& model : models) {
-    if (auto ok = check_model(model, dimension); !ok) return ok;
+    if (auto ok = check_model(model, dimension, own); !ok) return ok;
   }
   if (auto size = check_size("labels.size()", labels.size(), points); !size) return size;
   if (tolerance.size() != 1) {
@@ -77,7 +87,7 @@ Result<> check_assign(std::span<const ModelView> models, int dimension, std::siz
 }
 
 Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<const float> distances,
-                     std::span<const Evidence> evidence) {
+                     std::span<const Evidence> evidence, const OwnModel* own) {
   if (auto ok = check_points(points); !ok) return ok;
   if (!(how.tolerance > 0 && std::isfinite(how.tolerance))) {
     return invalid(fmt::format("how.tolerance is {}, must be finite and > 0", how.tolerance));
@@ -87,7 +97,7 @@ Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<co
     if (auto size = check_size("how.caps.size()", how.caps.size(), points.count); !size) return size;
   }
   for (const ModelView& model : models) {
-    if (auto ok = check_model(model, points.dimension); !ok) return ok;
+    if (auto ok = check_model(model, points.dimension, own); !ok) return ok;
   }
   if (!distances.empty()) {
     if (auto size = check_size("distances.size()", distances.size(), models.size() * points.count); !size) return size;
@@ -96,9 +106,9 @@ Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<co
 }
 
 Result<> check_claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<const std::uint16_t> labels,
-                     std::span<const Evidence> evidence) {
+                     std::span<const Evidence> evidence, const OwnModel* own) {
   if (auto ok = check_points(points); !ok) return ok;
-  if (auto ok = check_assign(models, points.dimension, points.count, std::span<const float>(&tolerance, 1), labels); !ok) return ok;
+  if (auto ok = check_assign(models, points.dimension, points.count, std::span<const float>(&tolerance, 1), labels, own); !ok) return ok;
   return check_size("evidence.size()", evidence.size(), models.size());
 }
 

@@ -21,7 +21,16 @@ Result<Selection> selected(Result<std::unique_ptr<FitnessEvaluator>> made, std::
   return Selection{std::move(*made), std::move(reason)};
 }
 
+Result<std::unique_ptr<FitnessEvaluator>> make_cpu(const EvaluatorOptions& options) {
+  return options.own ? make_own_evaluator("cpu", options) : make_cpu_evaluator(options);
+}
+
+Result<std::unique_ptr<FitnessEvaluator>> make_reference(const EvaluatorOptions& options) {
+  return options.own ? make_own_evaluator("reference", options) : make_reference_evaluator();
+}
+
 Result<Selection> choose_automatically(const EvaluatorOptions& options) {
+  if (options.own && options.own->glsl.empty()) return selected(make_cpu(options), "auto: the own model has no GLSL");
   // Asking every driver takes tens of milliseconds, and a process may make many evaluators; what is plugged in later is taken by name.
   static const std::vector<DeviceDescription> devices = vulkan_devices();
   std::string why = "no GPU with Vulkan here";
@@ -32,9 +41,10 @@ Result<Selection> choose_automatically(const EvaluatorOptions& options) {
     }
     auto made = make_vulkan_evaluator(options, device.device);
     if (made) return Selection{std::move(*made), fmt::format("auto: {} is a {}", device.device, device.kind)};
+    if (made.error().kind == Failure::Kind::invalid) return tl::unexpected(made.error());
     why = made.error().message;
   }
-  return selected(make_cpu_evaluator(options), "auto: " + why);
+  return selected(make_cpu(options), "auto: " + why);
 }
 
 }  // namespace
@@ -50,13 +60,13 @@ std::vector<DeviceDescription> list_devices() {
 Result<Selection> make_evaluator(std::string_view name, const EvaluatorOptions& options) {
   if (options.threads < 0) return fail(Failure::Kind::invalid, fmt::format("threads is {}, must be >= 0", options.threads));
   if (name == "auto") return choose_automatically(options);
-  if (name == "cpu") return selected(make_cpu_evaluator(options), "asked for by name");
-  if (name == "reference") return selected(make_reference_evaluator(), "asked for by name");
+  if (name == "cpu") return selected(make_cpu(options), "asked for by name");
+  if (name == "reference") return selected(make_reference(options), "asked for by name");
   if (name == "vulkan") return selected(make_vulkan_evaluator(options, ""), "asked for by name");
   std::string known = "auto, cpu, vulkan, reference";
   for (const DeviceDescription& device : list_devices()) {
     if (device.backend != "reference" && device.kind != "none" && contains_ignoring_case(device.device, name)) {
-      return selected(device.backend == "cpu" ? make_cpu_evaluator(options) : make_vulkan_evaluator(options, device.device),
+      return selected(device.backend == "cpu" ? make_cpu(options) : make_vulkan_evaluator(options, device.device),
                       "asked for by device name");
     }
     if (device.backend == "vulkan" && device.kind != "none") known += ", " + device.device;

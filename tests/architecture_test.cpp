@@ -254,10 +254,18 @@ TEST(Readme, ShowsTheProgramThatIsCompiledAndRun) {
   EXPECT_NE(readme.find("```cpp\n" + program + "```"), std::string::npos) << "README.md must hold samples/readme.cpp word for word";
 }
 
+TEST(OwnModels, AreDocumentedByTheSampleThatIsCompiledAndRun) {
+  const std::string page = read(root / "docs/own_models.md"), sample = read(root / "samples/own_ellipse.cpp");
+  const std::size_t begin = page.find("```cpp\n") + 7, end = page.find("```", begin);
+  ASSERT_NE(end, std::string::npos);
+  EXPECT_NE(sample.find(page.substr(begin, end - begin)), std::string::npos)
+      << "docs/own_models.md must show lines of samples/own_ellipse.cpp";
+}
+
 TEST(Readme, EveryFileItPointsToExists) {
   static const std::regex link(R"(\]\(([^)#:]+)\))");
   for (const char* page : {"README.md", "CONTRIBUTING.md", "docs/architecture.md", "docs/embedding.md", "docs/fitting.md", "docs/method.md",
-                           "docs/performance.md", "docs/report.md"}) {
+                           "docs/own_models.md", "docs/performance.md", "docs/report.md"}) {
     const std::string text = read(root / page);
     ASSERT_FALSE(text.empty()) << page;
     for (std::sregex_iterator it(text.begin(), text.end(), link), end; it != end; ++it) {

@@ -24,6 +24,7 @@ Parameters true_model(ModelKind kind) {
     case ModelKind::sphere: return {0.1, -0.2, 0.15, 0.6};
     case ModelKind::cylinder: return {0.1, -0.2, 0.15, 2.0 / 7, 3.0 / 7, 6.0 / 7, 0.5};
     case ModelKind::homography: return {1.02, 0.05, 0.1, -0.04, 0.97, -0.05, 0.05, -0.03, 1};
+    case ModelKind::own:
     case ModelKind::fundamental: break;
   }
   return {0.02, -0.3, 0.2, 0.28, 0.03, -1, -0.19, 0.98, 0.05};  // epipoles well outside the images

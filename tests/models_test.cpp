@@ -57,6 +57,7 @@ double textbook(ModelKind kind, const double* p, const Point& x) {
       const double there = transfer(p, x[0], x[1], x[2], x[3]), back = transfer(inverse(p).data(), x[2], x[3], x[0], x[1]);
       return std::sqrt((there * there + back * back) / 2);
     }
+    case ModelKind::own:
     case ModelKind::fundamental: break;
   }
   const std::array<double, 9> transposed{p[0], p[3], p[6], p[1], p[4], p[7], p[2], p[5], p[8]};

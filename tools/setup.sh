@@ -6,8 +6,8 @@ set -euo pipefail
 packages=(
   # build
   g++ cmake ninja-build ccache
-  # Vulkan: headers and loader, a software device (lavapipe), validation, GLSL to SPIR-V
-  libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools
+  # Vulkan: headers and loader, a software device (lavapipe), validation, GLSL to SPIR-V as a command and as a library
+  libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools glslang-dev
   # libraries
   libhwy-dev libtbb-dev libeigen3-dev librandom123-dev libexpected-dev libcli11-dev nlohmann-json3-dev libfmt-dev liblzf-dev
   libnanoflann-dev

@@ -109,6 +109,7 @@ std::vector<float> synthetic_points(ModelType type, std::size_t count, std::uint
     case ModelType::circle2d:
     case ModelType::sphere: return cloud(Rounds(columns, false, number), columns, count, number);
     case ModelType::cylinder: return cloud(Rounds(columns, true, number), columns, count, number);
+    case ModelType::own: return {};  // nobody here knows what it looks like
     case ModelType::homography:
     case ModelType::fundamental: break;
   }

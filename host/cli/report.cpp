@@ -87,6 +87,7 @@ std::string parameters(const Model& m) {
     case ModelType::fundamental:
       return fmt::format("[{:.3g} {:.3g} {:.3g}; {:.3g} {:.3g} {:.3g}; {:.3g} {:.3g} {:.3g}]", p[0], p[1], p[2], p[3], p[4], p[5], p[6],
                          p[7], p[8]);
+    case ModelType::own: break;  // not from the command
   }
   return {};
 }

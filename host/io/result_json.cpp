@@ -45,6 +45,7 @@ std::string parameters(const Model& model) {
       return fmt::format(R"({{"point":{},"axis":{},"radius":{}}})", list(p.head<3>(), 3), list(p.segment<3>(3), 3), number(p[6]));
     case ModelType::homography:
     case ModelType::fundamental: return fmt::format(R"({{"matrix":{}}})", rows(p.reshaped<Eigen::RowMajor>(3, 3)));
+    case ModelType::own: return fmt::format(R"({{"values":{}}})", list(p, p.size()));
   }
   return "{}";
 }

@@ -1,4 +1,4 @@
-// The table of kinds: a new model is a row here and a file beside this one.
+// The table of kinds that are built in: a new model is a row here and a file beside this one.
 #include "host/models/model_space.hpp"
 
 #include <algorithm>
@@ -41,13 +41,13 @@ double ModelSpace::noise_variance(const WorkingPoints&, const Weighted& support,
 }
 
 std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior) { return row(type).make(prior); }
-kernels::ModelKind to_kernel(ModelType type) noexcept { return row(type).kernel; }
+kernels::ModelKind to_kernel(ModelType type) noexcept { return type == ModelType::own ? kernels::ModelKind::own : row(type).kernel; }
 
 }  // namespace models
 
-std::string_view name(ModelType type) noexcept { return kernels::traits(models::to_kernel(type)).name; }
+std::string_view name(ModelType type) noexcept { return type == ModelType::own ? "own" : kernels::traits(models::to_kernel(type)).name; }
 
-int dimension(ModelType type) noexcept { return kernels::traits(models::to_kernel(type)).dimension; }
+int dimension(ModelType type) noexcept { return type == ModelType::own ? 0 : kernels::traits(models::to_kernel(type)).dimension; }
 
 std::span<const ModelType> model_types() noexcept {
   static constexpr auto types = [] {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include <Eigen/Core>
 
@@ -33,6 +34,8 @@ class ModelSpace {
 
   virtual ModelType type() const noexcept = 0;
   virtual kernels::ModelKind kind() const noexcept = 0;
+  /// What messages call it.
+  virtual std::string_view title() const noexcept { return name(type()); }
   /// Independent components of a point's residual: 1 for a surface, 2 where a point must land on a point.
   virtual int residual_components() const noexcept { return 1; }
   /// Points that determine a model.
@@ -90,8 +93,9 @@ struct Placed {
   Position theta;
 };
 
-/// The space of a kind, with an optional prior on its direction.
+/// The space of a built-in kind, with an optional prior on its direction.
 std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior);
+std::unique_ptr<ModelSpace> make_own_space(const OwnModel& own);
 
 /// The kernels' name of a kind.
 kernels::ModelKind to_kernel(ModelType type) noexcept;

@@ -17,7 +17,8 @@ Eigen::VectorXd about(ModelType type, Eigen::VectorXd p, const Eigen::Vector3d& 
     case ModelType::sphere:
     case ModelType::cylinder: p.head<3>() -= centre; break;
     case ModelType::homography:
-    case ModelType::fundamental: break;
+    case ModelType::fundamental:
+    case ModelType::own: break;  // who knows how to move it
   }
   return p;
 }

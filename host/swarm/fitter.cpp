@@ -8,6 +8,7 @@
 #include <swarmfit/fit.hpp>
 
 #include "host/models/model_space.hpp"
+#include "host/models/own_model.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_scale.hpp"
@@ -26,7 +27,8 @@ constexpr double kFundamental = 2.5;  // [px]
 std::optional<double> default_threshold(ModelType type) {
   switch (type) {
     case ModelType::line2d:
-    case ModelType::circle2d: return std::nullopt;
+    case ModelType::circle2d:
+    case ModelType::own: return std::nullopt;
     case ModelType::plane:
     case ModelType::sphere:
     case ModelType::cylinder: return kSurface;
@@ -39,17 +41,17 @@ std::optional<double> default_threshold(ModelType type) {
 Expected<> check_points(const PointsView& points, const models::WorkingPoints& working, const models::ModelSpace& space) {
   const auto least = static_cast<std::size_t>(space.minimal_sample());
   if (points.size() < least) {
-    return fail(Error::Kind::bad_input, fmt::format("points is {}, must be >= {} to fit a {}", points.size(), least, name(space.type())));
+    return fail(Error::Kind::bad_input, fmt::format("points is {}, must be >= {} to fit a {}", points.size(), least, space.title()));
   }
   if (working.finite_count() < least) {
     return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= {} to fit a {}", working.finite_count(),
-                                                    points.size(), least, name(space.type())));
+                                                    points.size(), least, space.title()));
   }
   if (working.rank() < space.least_rank()) {
     static constexpr const char* kShapes[] = {"all coincide", "are collinear", "are coplanar"};
     return fail(Error::Kind::bad_input,
                 fmt::format("the {} finite points {}: rank is {}, must be >= {} to fit a {}", working.finite_count(),
-                            kShapes[working.rank()], working.rank(), space.least_rank(), name(space.type())));
+                            kShapes[working.rank()], working.rank(), space.least_rank(), space.title()));
   }
   return {};
 }
@@ -93,15 +95,31 @@ Expected<models::WorkingPoints> survey(kernels::FitnessEvaluator& evaluator, con
 
 struct Fitter::State {
   FitOptions options;
+  std::shared_ptr<models::OwnWatch> watch = std::make_shared<models::OwnWatch>();
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
   SwarmObserver observer;
 
-  kernels::EvaluatorOptions wanted() const {
-    kernels::EvaluatorOptions w;
-    w.threads = options.threads;
-    w.pipeline_cache = options.pipeline_cache;
-    return w;
+  /// Takes the options, and makes the back end that they ask for.
+  Expected<> open(FitOptions wanted) {
+    kernels::EvaluatorOptions evaluation;
+    evaluation.threads = wanted.threads;
+    evaluation.pipeline_cache = wanted.pipeline_cache;
+    if (wanted.own) {
+      wanted.own = models::watched(*wanted.own, watch);
+      evaluation.own = models::to_kernel(*wanted.own);
+    }
+    auto made = kernels::make_evaluator(wanted.backend, evaluation);
+    if (!made) {
+      Error error = swarm::to_error(made.error());
+      // There are no data yet: what is invalid here is an option.
+      if (made.error().kind == kernels::Failure::Kind::invalid) error.kind = Error::Kind::invalid_option;
+      return tl::unexpected(std::move(error));
+    }
+    evaluator = std::move(made->evaluator);
+    reason = std::move(made->reason);
+    options = std::move(wanted);
+    return {};
   }
 };
 
@@ -113,11 +131,7 @@ Fitter& Fitter::operator=(Fitter&&) noexcept = default;
 Expected<Fitter> Fitter::create(const FitOptions& options) {
   if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
   auto state = std::make_unique<State>();
-  state->options = options;
-  auto made = kernels::make_evaluator(options.backend, state->wanted());
-  if (!made) return tl::unexpected(swarm::to_error(made.error()));
-  state->evaluator = std::move(made->evaluator);
-  state->reason = std::move(made->reason);
+  if (auto opened = state->open(options); !opened) return tl::unexpected(opened.error());
   return Fitter(std::move(state));
 }
 
@@ -134,6 +148,7 @@ Expected<> Fitter::set_options(const FitOptions& options) {
     return fail(Error::Kind::invalid_option, fmt::format("threads is {}, must stay {}", options.threads, old.threads));
   if (options.pipeline_cache != old.pipeline_cache)
     return fail(Error::Kind::invalid_option, fmt::format("pipeline_cache is {}, must stay {}", options.pipeline_cache, old.pipeline_cache));
+  if (options.own || old.own) return state_->open(options);
   state_->options = options;
   return {};
 }
@@ -150,10 +165,12 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   limits.stop = std::move(stop);
   limits.max_models = state_->options.max_models;
   const FitOptions& options = state_->options;
+  state_->watch->take();
   std::vector<swarm::Kind> kinds = swarm::make_kinds(options);
-  if (points.dimension() != dimension(options.model)) {
-    return fail(Error::Kind::bad_input, fmt::format("points have {} columns, must have {} to fit a {}", points.dimension(),
-                                                    dimension(options.model), name(options.model)));
+  const int columns = options.own ? options.own->dimension : dimension(options.model);
+  if (points.dimension() != columns) {
+    return fail(Error::Kind::bad_input,
+                fmt::format("points have {} columns, must have {} to fit a {}", points.dimension(), columns, kinds.front().space->title()));
   }
   kernels::FitnessEvaluator& evaluator = *state_->evaluator;
   auto whole = survey(evaluator, points);
@@ -207,6 +224,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   std::vector<float> corners;
   for (const models::Placed& model : search.found()) corners.push_back(search.corner(*model.space));
   if (auto done = swarm::settle(ground, found, corners, result); !done) return tl::unexpected(done.error());
+  if (const auto thrown = state_->watch->take()) return fail(Error::Kind::bad_input, *thrown);
   result.backend = backend();
   result.seed = options.seed;
   result.finite_points = whole->finite_count();

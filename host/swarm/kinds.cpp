@@ -11,6 +11,10 @@ ModelType flat_of(ModelType type) noexcept { return dimension(type) == 2 ? Model
 std::vector<Kind> make_kinds(const FitOptions& options) {
   const std::vector<ModelType> asked = options.kinds();
   std::vector<Kind> kinds;
+  if (options.model == ModelType::own) {
+    kinds.push_back({models::make_own_space(*options.own), {}, false});
+    return kinds;
+  }
   for (const ModelType type : asked) kinds.push_back({models::make_space(type, options.prior), {}, false});
   const ModelType flat = flat_of(options.model);
   // A flat kind with a prior leaves out what is flat and lies otherwise.

@@ -28,6 +28,10 @@ Expected<> check_prior(const DirectionPrior& prior) {
   return require(prior.max_angle > 0 && prior.max_angle <= 1.5707963267948968, "prior.max_angle", prior.max_angle, "in (0, pi/2] rad");
 }
 
+Deflation deflation_of(const FitOptions& options) {
+  return options.deflation.value_or(options.preset == Preset::paper ? Deflation::parametric : Deflation::residual);
+}
+
 /// What each of several kinds must be to compete for the same points.
 Expected<> check_rivals(const FitOptions& options) {
   const auto refuse = [](ModelType rival, const std::string& bound) {
@@ -45,11 +49,27 @@ Expected<> check_rivals(const FitOptions& options) {
     if (rival == options.model || std::find(options.rivals.begin(), before, rival) != before) return refuse(rival, "each kind once");
   }
   if (options.rivals.empty()) return {};
-  if (options.deflation.value_or(options.preset == Preset::paper ? Deflation::parametric : Deflation::residual) == Deflation::parametric) {
+  if (deflation_of(options) == Deflation::parametric) {
     return fail(Error::Kind::invalid_option,
                 fmt::format("deflation is parametric with {} kinds, must be residual (preset fast)", options.kinds().size()));
   }
   return {};
+}
+
+/// An own model is fitted by itself, and without Eq. (5): nobody knows how far apart two of it are.
+Expected<> check_own(const FitOptions& options) {
+  const auto refuse = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
+  const bool wanted = options.model == ModelType::own;
+  if (!wanted && options.own) return refuse(fmt::format("model is {}, must be own where own is given", name(options.model)));
+  if (!wanted) return {};
+  if (!options.own) return refuse("own is empty, must be given where model is own");
+  if (!options.rivals.empty()) {
+    return refuse(fmt::format("rivals holds {}, must hold nothing beside an own model", name(options.rivals.front())));
+  }
+  if (deflation_of(options) == Deflation::parametric) {
+    return refuse("deflation is parametric, must be residual for an own model (preset fast)");
+  }
+  return options.own->validate();
 }
 
 bool has_direction(ModelType type) { return type == ModelType::line2d || type == ModelType::plane || type == ModelType::cylinder; }
@@ -77,6 +97,7 @@ Expected<> FitOptions::validate() const {
   for (Expected<>& check : checks) {
     if (!check) return std::move(check);
   }
+  if (auto ok = check_own(*this); !ok) return ok;
   if (auto ok = check_rivals(*this); !ok) return ok;
   if (!prior) return {};
   const std::vector<ModelType> all = kinds();
@@ -144,7 +165,8 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.stands_for = fitted > 0 ? static_cast<double>(finite_points) / static_cast<double>(fitted) : 1.0;
   // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.
   const std::size_t share = fitted / 100;
-  const auto least = static_cast<std::size_t>(2 * models::make_space(options.model, {})->minimal_sample() + 1);
+  const int sample = options.own ? options.own->minimal_sample : models::make_space(options.model, {})->minimal_sample();
+  const auto least = static_cast<std::size_t>(2 * sample + 1);
   const auto wanted = static_cast<std::size_t>(std::ceil(static_cast<double>(options.min_inliers) / s.stands_for));
   s.min_inliers = options.min_inliers > 0 ? wanted : std::max(share, least);
   return s;

@@ -8,9 +8,20 @@
 
 namespace swarmfit::kernels {
 
-/// The values are shared with shaders/layout.h.
-enum class ModelKind : std::uint32_t { line2d = 0, plane = 1, circle2d = 2, sphere = 3, cylinder = 4, homography = 5, fundamental = 6 };
+/// The values are shared with shaders/layout.h. `own` is whatever model an evaluator was made for (kernels/own/own_model.hpp): such an
+/// evaluator takes no other kind, and none but such takes it.
+enum class ModelKind : std::uint32_t {
+  line2d = 0,
+  plane = 1,
+  circle2d = 2,
+  sphere = 3,
+  cylinder = 4,
+  homography = 5,
+  fundamental = 6,
+  own = 7
+};
 
+/// Those that are built in.
 inline constexpr ModelKind kModelKinds[] = {ModelKind::line2d,   ModelKind::plane,      ModelKind::circle2d,   ModelKind::sphere,
                                             ModelKind::cylinder, ModelKind::homography, ModelKind::fundamental};
 
@@ -38,6 +49,7 @@ struct ModelView {
   std::span<const double> parameters;  ///< in the data's own frame and unit
 };
 
+/// Of the kinds that are built in.
 const ModelTraits& traits(ModelKind kind) noexcept;
 std::optional<ModelKind> model_kind(std::string_view name) noexcept;
 

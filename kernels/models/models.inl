@@ -16,7 +16,7 @@
 #include "kernels/models/plane.inl"
 #include "kernels/models/sphere.inl"
 
-/// Calls visitor.template operator()<Model>() for the model of that kind.
+/// Calls visitor.template operator()<Model>() for the model of that kind, which is built in.
 template <class Visitor>
 SWARMFIT_INLINE decltype(auto) visit_model(ModelKind kind, Visitor&& visitor) {
   switch (kind) {
@@ -26,7 +26,8 @@ SWARMFIT_INLINE decltype(auto) visit_model(ModelKind kind, Visitor&& visitor) {
     case ModelKind::cylinder: return visitor.template operator()<Cylinder>();
     case ModelKind::homography: return visitor.template operator()<Homography>();
     case ModelKind::fundamental: return visitor.template operator()<Fundamental>();
-    case ModelKind::plane: break;
+    case ModelKind::plane:
+    case ModelKind::own: break;
   }
   return visitor.template operator()<Plane>();
 }

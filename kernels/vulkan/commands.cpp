@@ -140,8 +140,8 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
   return commands;
 }
 
-void Commands::costs(ModelKind kind, Loss loss, std::span<float> costs) {
-  const TileShape shape = tile_shape(device_.traits(), costs.size(), traits(kind).coefficient_count);
+void Commands::costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs) {
+  const TileShape shape = tile_shape(device_.traits(), costs.size(), coefficients);
   reserve_particles(shape.padded());
   const Key key{kind, loss, shape.tile, shape.tiles};
   auto commands = recorded_.find(key);

@@ -26,8 +26,8 @@ class Commands {
   /// Room for `models` coefficient rows, mapped: kCoefficientStride floats each.
   std::span<float> coefficients(std::size_t models);
 
-  /// Runs both passes over the coefficients written; sums segments in double.
-  void costs(ModelKind kind, Loss loss, std::span<float> costs);
+  /// Runs both passes over the coefficients written, so many a model; sums segments in double.
+  void costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs);
   /// Fills each segment's output, mapped, with floats.
   void distances(ModelKind kind);
   /// Fills each segment's output with 32-bit labels. `kind` is that of all models, or layout::kAnyModel. A negative tolerance: each point

@@ -65,6 +65,16 @@ Pipelines::~Pipelines() {
   if (!pipelines_.empty()) cache_.save();
 }
 
+void Pipelines::use(const OwnShaders& own) {
+  const auto replace = [&](Shader shader, Spirv code) {
+    modules_[static_cast<std::size_t>(shader)] =
+        vk::raii::ShaderModule(device_.handle(), vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data()));
+  };
+  replace(Shader::cost, own.cost);
+  replace(Shader::distances, own.distances);
+  replace(Shader::assign, own.assign);
+}
+
 vk::Pipeline Pipelines::get(const Specialisation& wanted) {
   const auto found = pipelines_.find(wanted);
   if (found != pipelines_.end()) return *found->second;

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/vulkan/own_shaders.hpp"
 #include "kernels/vulkan/pipeline_cache.hpp"
 
 namespace swarmfit::kernels::vulkan {
@@ -32,6 +33,9 @@ class Pipelines {
   Pipelines(const Pipelines&) = delete;
   Pipelines& operator=(const Pipelines&) = delete;
 
+  /// From now on these, in place of the shaders that have the built-in models. Before the first get. Throws std::exception.
+  void use(const OwnShaders& own);
+
   vk::Pipeline get(const Specialisation& wanted);
   vk::PipelineLayout layout() const noexcept { return *layout_; }
   vk::DescriptorSetLayout set_layout() const noexcept { return *set_layout_; }
@@ -45,7 +49,7 @@ class Pipelines {
   std::map<Specialisation, vk::raii::Pipeline> pipelines_;
 };
 
-/// Whether shaders/CMakeLists.txt lists this kind, at its number.
+/// Whether shaders/CMakeLists.txt lists this built-in kind, at its number.
 bool has_shader(ModelKind kind) noexcept;
 
 }  // namespace swarmfit::kernels::vulkan

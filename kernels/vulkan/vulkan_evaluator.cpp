@@ -7,6 +7,7 @@
 
 #include "kernels/checks.hpp"
 #include "kernels/evaluators.hpp"
+#include "kernels/own/own_passes.hpp"
 #include "kernels/vulkan/commands.hpp"
 #include "kernels/vulkan/guarded.hpp"
 #include "shaders/layout.h"
@@ -28,6 +29,9 @@ class VulkanEvaluator final : public FitnessEvaluator {
         commands_(device_, pipelines_),
         identity_{"vulkan", device_.traits().name} {}
 
+  /// Takes this model in place of those that are built in. Before anything else.
+  Result<> adopt(std::shared_ptr<const OwnModel> own);
+
   const Identity& identity() const noexcept override { return identity_; }
   Support supports(const Workload& workload) const override;
   Result<> set_points(const PointsView& points) override;
@@ -36,8 +40,14 @@ class VulkanEvaluator final : public FitnessEvaluator {
   Result<> distances(const ModelView& model, std::span<float> distances) override;
   Result<> assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) override;
   Effort effort() const noexcept override { return effort_; }
+  Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
+                 std::span<Evidence> evidence) override;
+  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
+                 std::span<Evidence> evidence) override;
 
  private:
+  ModelTraits traits_of(ModelKind kind) const noexcept { return own_ ? own_->traits() : traits(kind); }
+  bool centred(ModelKind kind, const double* parameters, double* coefficients) const;
   void evaluate_slice(const SwarmView& swarm, Loss loss, std::span<float> costs);
   bool write_model(ModelKind kind, const double* parameters, std::span<float> row) const;
   template <class T, class Out>
@@ -50,13 +60,22 @@ class VulkanEvaluator final : public FitnessEvaluator {
   Cloud cloud_;
   Commands commands_;
   Identity identity_;
+  std::shared_ptr<const OwnModel> own_;
   int dimension_ = 0;
   Effort effort_;
 };
 
+Result<> VulkanEvaluator::adopt(std::shared_ptr<const OwnModel> own) {
+  const auto shaders = compile_own(*own, device_.traits().texels);
+  if (!shaders) return tl::unexpected(shaders.error());
+  pipelines_.use(*shaders);
+  own_ = std::move(own);
+  return {};
+}
+
 Support VulkanEvaluator::supports(const Workload& workload) const {
-  const ModelTraits& model = traits(workload.kind);
-  if (!has_shader(workload.kind)) return {false, fmt::format("{} has no shader", model.name)};
+  const ModelTraits model = traits_of(workload.kind);
+  if (!own_ && !has_shader(workload.kind)) return {false, fmt::format("{} has no shader", model.name)};
   const std::size_t bytes = workload.points * (static_cast<std::size_t>(model.dimension) + 1) * sizeof(float);
   if (bytes > device_.traits().memory) {
     return {false, fmt::format("{} points take {} bytes, {} has {}", workload.points, bytes, identity_.device, device_.traits().memory)};
@@ -68,7 +87,9 @@ Result<> VulkanEvaluator::set_points(const PointsView& points) {
   if (auto ok = check_points(points); !ok) return ok;
   dimension_ = 0;  // until all of it has worked
   auto done = guarded("set_points", Failure::Kind::device, [&]() -> Result<> {
-    if (auto ok = cloud_.set(points, measure(points)); !ok) return ok;
+    Extent extent = measure(points);
+    if (own_ && !own_->recentre) std::fill_n(extent.centre, kMaxDimension, 0.0);
+    if (auto ok = cloud_.set(points, std::move(extent)); !ok) return ok;
     commands_.bind(cloud_, points.dimension);
     return {};
   });
@@ -86,9 +107,9 @@ Result<> VulkanEvaluator::set_caps(std::span<const float> caps) {
 }
 
 Result<> VulkanEvaluator::evaluate(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs) {
-  if (auto ok = check_swarm(swarm, dimension_, cutoffs, costs); !ok) return ok;
+  if (auto ok = check_swarm(swarm, dimension_, cutoffs, costs, own_.get()); !ok) return ok;
   auto done = guarded("evaluate", Failure::Kind::device, [&]() -> Result<> {
-    const auto width = static_cast<std::size_t>(traits(swarm.kind).parameter_count);
+    const auto width = static_cast<std::size_t>(traits_of(swarm.kind).parameter_count);
     const std::size_t limit = commands_.swarm_limit();
     for (std::size_t j = 0; j < swarm.count; j += limit) {
       const std::size_t count = std::min(limit, swarm.count - j);
@@ -104,7 +125,7 @@ Result<> VulkanEvaluator::evaluate(const SwarmView& swarm, Loss loss, std::span<
 }
 
 void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::span<float> costs) {
-  const auto width = static_cast<std::size_t>(traits(swarm.kind).parameter_count);
+  const auto width = static_cast<std::size_t>(traits_of(swarm.kind).parameter_count);
   const std::span<float> rows = commands_.coefficients(swarm.count);
   for (std::size_t j = 0; j < swarm.count; ++j) {
     write_model(swarm.kind, swarm.parameters.data() + j * width, rows.subspan(j * layout::kCoefficientStride, layout::kCoefficientStride));
@@ -112,24 +133,32 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
   if (cloud_.segments().empty()) {
     std::fill(costs.begin(), costs.end(), 0.0F);
   } else {
-    commands_.costs(swarm.kind, loss, costs);
+    commands_.costs(swarm.kind, traits_of(swarm.kind).coefficient_count, loss, costs);
   }
   for (std::size_t j = 0; j < swarm.count; ++j) {
     double k[kMaxCoefficients];
-    if (!centred_coefficients(swarm.kind, swarm.parameters.data() + j * width, cloud_.extent().centre, k)) {
+    if (!centred(swarm.kind, swarm.parameters.data() + j * width, k)) {
       costs[j] = std::numeric_limits<float>::infinity();
     }
   }
 }
 
+/// Coefficients in the frame of the stored points; false if one is not finite.
+bool VulkanEvaluator::centred(ModelKind kind, const double* parameters, double* coefficients) const {
+  if (!own_) return centred_coefficients(kind, parameters, cloud_.extent().centre, coefficients);
+  const OwnDistances model(*own_, {parameters, static_cast<std::size_t>(own_->parameter_count)}, cloud_.extent().centre);
+  std::copy(model.parameters().begin(), model.parameters().end(), coefficients);
+  return model.usable();
+}
+
 /// Returns false, and writes zeros, if a coefficient is not finite.
 bool VulkanEvaluator::write_model(ModelKind kind, const double* parameters, std::span<float> row) const {
   double k[kMaxCoefficients];
-  const bool finite = centred_coefficients(kind, parameters, cloud_.extent().centre, k);
+  const bool finite = centred(kind, parameters, k);
   std::fill(row.begin(), row.end(), 0.0F);
   // What float cannot hold is farther away than any point either way.
   constexpr double kMost = 1e30;
-  for (int c = 0; finite && c < traits(kind).coefficient_count; ++c) {
+  for (int c = 0; finite && c < traits_of(kind).coefficient_count; ++c) {
     row[static_cast<std::size_t>(c)] = static_cast<float>(std::clamp(k[c], -kMost, kMost));
   }
   row[layout::kKindSlot] = static_cast<float>(kind);
@@ -145,7 +174,7 @@ void VulkanEvaluator::read_output(std::span<Out> out) {
 }
 
 Result<> VulkanEvaluator::distances(const ModelView& model, std::span<float> distances) {
-  if (auto ok = check_model(model, dimension_); !ok) return ok;
+  if (auto ok = check_model(model, dimension_, own_.get()); !ok) return ok;
   if (auto ok = check_size("distances.size()", distances.size(), cloud_.extent().finite.size()); !ok) return ok;
   return guarded("distances", Failure::Kind::device, [&]() -> Result<> {
     const bool finite = write_model(model.kind, model.parameters.data(), commands_.coefficients(1));
@@ -163,7 +192,7 @@ Result<> VulkanEvaluator::distances(const ModelView& model, std::span<float> dis
 }
 
 Result<> VulkanEvaluator::assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) {
-  if (auto ok = check_assign(models, dimension_, cloud_.extent().finite.size(), tolerance, labels); !ok) return ok;
+  if (auto ok = check_assign(models, dimension_, cloud_.extent().finite.size(), tolerance, labels, own_.get()); !ok) return ok;
   if (models.size() > commands_.model_limit()) {
     return fail(Failure::Kind::invalid,
                 fmt::format("models.size() is {}, must be <= {} on {}", models.size(), commands_.model_limit(), identity_.device));
@@ -188,6 +217,26 @@ Result<> VulkanEvaluator::assign(std::span<const ModelView> models, std::span<co
   });
 }
 
+Result<> VulkanEvaluator::weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models,
+                                std::span<float> distances, std::span<Evidence> evidence) {
+  if (!own_) return FitnessEvaluator::weigh(points, how, models, distances, evidence);
+  if (auto ok = check_weigh(points, how, models, distances, evidence, own_.get()); !ok) return ok;
+  return guarded("weigh", Failure::Kind::device, [&]() -> Result<> {
+    weigh_own(*own_, points, how, models, distances, evidence, Sharing::threads);
+    return {};
+  });
+}
+
+Result<> VulkanEvaluator::claim(const PointsView& points, float tolerance, std::span<const ModelView> models,
+                                std::span<std::uint16_t> labels, std::span<Evidence> evidence) {
+  if (!own_) return FitnessEvaluator::claim(points, tolerance, models, labels, evidence);
+  if (auto ok = check_claim(points, tolerance, models, labels, evidence, own_.get()); !ok) return ok;
+  return guarded("claim", Failure::Kind::device, [&]() -> Result<> {
+    claim_own(*own_, points, tolerance, models, labels, evidence, Sharing::threads);
+    return {};
+  });
+}
+
 bool contains_ignoring_case(std::string_view text, std::string_view part) {
   const auto same = [](char a, char b) {
     return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
@@ -202,7 +251,11 @@ Result<std::unique_ptr<FitnessEvaluator>> make(const EvaluatorOptions& options, 
     const std::string device_name = device.getProperties().deviceName.data();
     const std::string why = obstacle(device);
     if (why.empty() && contains_ignoring_case(device_name, name)) {
-      return std::make_unique<VulkanEvaluator>(std::move(instance), std::move(device), options);
+      auto evaluator = std::make_unique<VulkanEvaluator>(std::move(instance), std::move(device), options);
+      if (options.own) {
+        if (auto done = evaluator->adopt(options.own); !done) return tl::unexpected(done.error());
+      }
+      return evaluator;
     }
     seen += fmt::format("{}{}{}", seen.empty() ? "" : ", ", device_name, why.empty() ? "" : " (" + why + ")");
   }

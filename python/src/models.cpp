@@ -24,6 +24,7 @@ int parameter_count(ModelType type) {
     case ModelType::cylinder: return 7;
     case ModelType::homography:
     case ModelType::fundamental: return 9;
+    case ModelType::own: break;  // not from Python
   }
   return 0;
 }

@@ -15,6 +15,7 @@
 #include <swarmfit/error.hpp>
 #include <swarmfit/export.hpp>
 #include <swarmfit/model.hpp>
+#include <swarmfit/own_model.hpp>
 #include <swarmfit/points.hpp>
 #include <swarmfit/trace.hpp>
 
@@ -39,8 +40,9 @@ struct DirectionPrior {
 struct FitOptions {
   ModelType model = ModelType::plane;
   std::vector<ModelType> rivals;  ///< further kinds that compete with `model` for the same points; all of 2 or all of 3 columns, each once
+  std::optional<OwnModel> own;    ///< with `model` = own, and only then: what is fitted; no rivals, and residual deflation
   std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane, sphere, cylinder 0.01;
-                                    ///< homography 6 px, fundamental 2.5 px; line2d and circle2d estimate it)
+                                    ///< homography 6 px, fundamental 2.5 px; line2d, circle2d and own estimate it)
   bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
   Preset preset = Preset::fast;     ///< decides every option below that is left empty
   std::optional<int> particles;     ///< M, >= 2
@@ -89,13 +91,15 @@ struct FitResult {
 /// Holds a back end; reuse it over frames. Not thread-safe; one a thread.
 class SWARMFIT_API Fitter {
  public:
-  /// Fails with invalid_option or backend_unavailable.
+  /// Fails with invalid_option or backend_unavailable. An own model's GLSL that does not compile is an invalid_option with the compiler's
+  /// words, where the back end is a Vulkan device.
   static Expected<Fitter> create(const FitOptions& options);
   ~Fitter();
   Fitter(Fitter&&) noexcept;
   Fitter& operator=(Fitter&&) noexcept;
 
-  /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension).
+  /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension,
+  /// an own model's function that threw).
   Expected<FitResult> fit(const PointsView& points, const ModelCallback& on_model = {}, std::stop_token stop = {},
                           const std::vector<Model>& warm_start = {});
 
@@ -104,6 +108,7 @@ class SWARMFIT_API Fitter {
 
   const FitOptions& options() const noexcept;
   /// Options of the fits to come, on the same back end. Fails with invalid_option, also where backend, threads or pipeline_cache differ.
+  /// To or from an own model the back end is made anew, and what create() fails with is possible.
   Expected<> set_options(const FitOptions& options);
   BackendInfo backend() const;
 

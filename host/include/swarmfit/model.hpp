@@ -22,6 +22,7 @@ enum class ModelType {
   cylinder,     ///< points (x, y, z); parameters px, py, pz, ax, ay, az, radius: a point of the axis, its unit direction
   homography,   ///< points (x1, y1, x2, y2) [px]; parameters H row by row, |H| = 1: (x2, y2, 1) ~ H (x1, y1, 1)
   fundamental,  ///< points (x1, y1, x2, y2) [px]; parameters F row by row, |F| = 1: (x2, y2, 1) F (x1, y1, 1)^T = 0, of rank 2
+  own,          ///< a model of your own, FitOptions::own; its parameters are what its functions make of them
 };
 
 /// The name used on the command line and in result.json.
@@ -30,9 +31,9 @@ SWARMFIT_API std::string_view name(ModelType type) noexcept;
 SWARMFIT_API Expected<ModelType> model_type(std::string_view name);
 /// Several kinds, their names parted by commas. Fails with invalid_option.
 SWARMFIT_API Expected<std::vector<ModelType>> model_types(std::string_view names);
-/// Every kind this build knows.
+/// Every kind that is built in.
 SWARMFIT_API std::span<const ModelType> model_types() noexcept;
-/// Columns of a point the kind is fitted to.
+/// Columns of a point the kind is fitted to; 0 for `own`, where OwnModel::dimension tells.
 SWARMFIT_API int dimension(ModelType type) noexcept;
 
 struct Model {

@@ -10,6 +10,7 @@
 #include <swarmfit/gallery.hpp>
 #include <swarmfit/images.hpp>
 #include <swarmfit/model.hpp>
+#include <swarmfit/own_model.hpp>
 #include <swarmfit/perception.hpp>
 #include <swarmfit/points.hpp>
 #include <swarmfit/report.hpp>
