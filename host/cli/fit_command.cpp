@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct FitArguments {
-  std::string model, input, option, normal, within;
+  std::string model, input, option, normal, within, noise = "none";
   VerticalFlags vertical;
   FitFlags fit;
   OutputFlags output;
@@ -78,6 +78,11 @@ Expected<FitOptions> fit_options(const FitArguments& arguments) {
   options.rivals.assign(kinds->begin() + 1, kinds->end());
   if (auto ok = apply_prior(arguments, options); !ok) return tl::unexpected(ok.error());
   if (auto ok = arguments.fit.apply(options); !ok) return tl::unexpected(ok.error());
+  if (arguments.noise != "none" && arguments.noise != "depth") {
+    return fail(Error::Kind::invalid_option, fmt::format("--noise: {}, must be none or depth", arguments.noise));
+  }
+  options.noise = arguments.noise == "depth" ? Noise::depth : Noise::none;
+  if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
   if (auto camera = arguments.camera.camera(); is_png(arguments.input) && !camera) return tl::unexpected(camera.error());
   return options;
 }
@@ -191,6 +196,13 @@ Command add_fit(CLI::App& app) {
       ->type_name("X,Y,Z")
       ->group(FitFlags::kGroup);
   sub->add_option("--within", arguments->within, "How near: within this angle [11.5]")->type_name("DEG")->group(FitFlags::kGroup);
+  sub->add_option(
+         "--noise", arguments->noise,
+         "depth: from the near end on, the threshold grows with the square of the depth z, as the noise of depth cameras and stereo "
+         "does; it is estimated where none is given")
+      ->type_name("none|depth")
+      ->group(FitFlags::kGroup)
+      ->capture_default_str();
   arguments->vertical.add_to(*sub, FitFlags::kGroup, "with it or --gravity, only planes that are level");
   arguments->fit.add_to(*sub);
   arguments->camera.add_to(*sub);

@@ -27,6 +27,9 @@ Expected<> check_gravity(const Eigen::Vector3d& g) {
 
 Expected<> PerceiveOptions::validate() const {
   if (auto ok = fit.validate(); !ok) return ok;
+  if (fit.noise != Noise::none) {
+    return fail(Error::Kind::invalid_option, "fit.noise is depth, must be none: perception has its own measure of a depth's noise");
+  }
   if (gravity && camera_tilt) return fail(Error::Kind::invalid_option, "gravity and camera-tilt are both given, must be one of them");
   if (gravity) {
     if (auto ok = check_gravity(*gravity); !ok) return ok;

@@ -47,7 +47,8 @@ double MultiModel::agreement(std::size_t kind, const models::Position& theta, st
 
 double MultiModel::saving(std::size_t kind, const models::Position& theta, std::span<const float> caps,
                           std::span<const float> distances) const {
-  return saved(caps, distances) * agreement(kind, theta, caps, distances);
+  std::vector<float> caps_room, room;
+  return saved(levelled(caps, caps_room), levelled(distances, room)) * agreement(kind, theta, caps, distances);
 }
 
 std::size_t MultiModel::flat_kind(std::size_t curved) const noexcept {

@@ -28,8 +28,15 @@ int tail_reach(const Support& support) {
   return reach;
 }
 
-void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps) {
+void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps, std::span<const float> allowed) {
   const auto steep = static_cast<float>(slope);
+  if (!allowed.empty()) {
+    for (std::size_t i = 0; i < caps.size(); ++i) {
+      const float left = steep * (distances[i] - static_cast<float>(reach) * allowed[i]);
+      caps[i] = left < caps[i] ? std::max(left, 0.0F) : caps[i];
+    }
+    return;
+  }
   const float width = static_cast<float>(reach) * tau;
   for (std::size_t i = 0; i < caps.size(); ++i) {
     const float left = steep * (distances[i] - width);

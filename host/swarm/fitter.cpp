@@ -11,6 +11,7 @@
 #include "host/models/own_model.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
+#include "host/swarm/noise_model.hpp"
 #include "host/swarm/noise_scale.hpp"
 #include "host/swarm/settings.hpp"
 #include "host/swarm/settle.hpp"
@@ -24,8 +25,10 @@ constexpr double kHomography = 6.0;   // [px]
 constexpr double kFundamental = 2.5;  // [px]
 
 /// The kind's fixed default, or none where the threshold is estimated.
-std::optional<double> default_threshold(ModelType type) {
-  switch (type) {
+std::optional<double> default_threshold(const FitOptions& options) {
+  // How far off the near points are depends on the sensor.
+  if (options.noise != Noise::none) return std::nullopt;
+  switch (options.model) {
     case ModelType::line2d:
     case ModelType::circle2d:
     case ModelType::own: return std::nullopt;
@@ -195,13 +198,16 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   const std::size_t searched = searches_part ? part.points.index().size() : working.size();
   if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 
+  const double depth = options.noise == Noise::none ? 0.0 : swarm::near_depth(working);
+  const std::vector<float> spread = swarm::spread_of(options.noise, working, depth);
+
   FitResult result;
   swarm::Watch watch{state_->observer, 0};
   std::vector<swarm::Known> known;
-  const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options.model);
+  const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options);
   if (options.estimate_threshold || !given) {
     auto estimated =
-        swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options, state_->observer ? &watch : nullptr);
+        swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options, state_->observer ? &watch : nullptr, spread);
     if (!estimated) return tl::unexpected(estimated.error());
     result.threshold = estimated->threshold;
     // The preset of the paper finds each model by a search of its own.
@@ -210,11 +216,13 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     result.threshold = *given;
   }
   swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
-  swarm::MultiModel search(evaluator, kinds, working, part, options.seed, limits);
+  swarm::MultiModel search(evaluator, kinds, working, part, options.seed, limits, spread);
   search.watched_by(state_->observer ? &watch : nullptr);
   if (auto done = search.run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
   std::vector<models::Placed> found = search.found();
-  const swarm::Ground ground{evaluator, *kinds.front().space, *whole, static_cast<float>(result.threshold)};
+  const auto tau = static_cast<float>(result.threshold);
+  const std::vector<float> allowed = swarm::allowed_by(thin_rows ? swarm::spread_of(options.noise, *whole, depth) : spread, tau);
+  const swarm::Ground ground{.evaluator = evaluator, .space = *kinds.front().space, .points = *whole, .tau = tau, .allowed = allowed};
   if (thin_rows) {
     found = moved(std::move(found), working.frame(), whole->frame());
     const std::vector<models::Placed> hidden = moved(search.hidden(), working.frame(), whole->frame());

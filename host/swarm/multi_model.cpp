@@ -6,6 +6,7 @@
 
 #include "host/swarm/deflation.hpp"
 #include "host/swarm/labelling.hpp"
+#include "host/swarm/noise_model.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/swarm.hpp"
@@ -19,7 +20,7 @@ constexpr int kFullRounds = 1;    // of refinement on all points, where it was d
 }  // namespace
 
 MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points,
-                       const Part& part, std::uint64_t seed, Limits limits)
+                       const Part& part, std::uint64_t seed, Limits limits, std::span<const float> spread)
     : evaluator_(evaluator),
       kinds_(kinds),
       asked_(static_cast<std::size_t>(std::count_if(kinds.begin(), kinds.end(), [](const Kind& kind) { return !kind.hidden; }))),
@@ -31,15 +32,25 @@ MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kin
       neighbours_(part.neighbours),
       part_searched_(settings_.searches_part(points.finite_count())),
       tau_(static_cast<float>(settings_.threshold)),
-      ground_{evaluator, *kinds.front().space, points, tau_},
-      part_ground_{evaluator, *kinds.front().space, points, tau_, &part_} {
+      allowed_(allowed_by(spread, tau_)),
+      ground_{.evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = tau_, .allowed = allowed_},
+      part_ground_{.evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = tau_, .part = &part_} {
+  if (!allowed_.empty()) part_.gather(allowed_, part_allowed_);
+  part_ground_.allowed = part_allowed_;
   for (const Kind& kind : kinds_) landscapes_.emplace_back(evaluator, *kind.space, points.frame(), kind.settings);
   restore_caps();
 }
 
 void MultiModel::restore_caps() {
   caps_.resize(points_.size());
-  for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] = points_.finite(i) ? tau_ : 0.0F;
+  for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] = points_.finite(i) ? ground_.allowed_at(i) : 0.0F;
+}
+
+std::span<const float> MultiModel::levelled(std::span<const float> values, std::vector<float>& room) const {
+  if (allowed_.empty()) return values;
+  room.resize(values.size());
+  for (std::size_t i = 0; i < room.size(); ++i) room[i] = values[i] * (tau_ / allowed_[i]);
+  return room;
 }
 
 double MultiModel::elapsed_ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - limits_.start).count(); }
@@ -133,10 +144,16 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
 }
 
 double MultiModel::loss_of_nothing(std::span<const float> caps) const {
-  if (settings_.deflation == Deflation::parametric) {
+  if (settings_.deflation == Deflation::parametric && allowed_.empty()) {
     return settings_.threshold * static_cast<double>(part_searched_ ? part_.index().size() : points_.finite_count());
   }
   double sum = 0;
+  if (settings_.deflation == Deflation::parametric) {
+    for (std::size_t k = 0; k < searched().size(); ++k) {
+      sum += points_.finite(searched().index(k)) ? static_cast<double>(searched().allowed_at(k)) : 0.0;
+    }
+    return sum;
+  }
   for (const float cap : part_searched_ ? std::span<const float>(part_caps_) : caps) sum += static_cast<double>(cap);
   return sum;
 }
@@ -146,7 +163,8 @@ Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t rou
   // Normals bring neighbourhoods that are too close for a kind which has no use for them.
   const bool close = points_.dimension() > 3 || space(kind).needs_normals();
   Sampler sampler(points_, part_.index(), close ? neighbours_ : none_, space(kind), random_);
-  sampler.prefer_unexplained(caps, alive);
+  std::vector<float> room;
+  sampler.prefer_unexplained(levelled(caps, room), alive);
   scale_ = loss_of_nothing(caps);
   if (!swarm.start(sampler, round, seeds)) {
     stop_reason_ = "complete: what is left determines no model";
@@ -233,7 +251,8 @@ Expected<> MultiModel::refine(Candidate& candidate) {
   auto least = refine_one(whole(candidate.kind), settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0, &candidate.distances);
   if (!least) return tl::unexpected(least.error());
   candidate.loss = *least;
-  candidate.support = count_support(candidate.distances, caps_, tau_, nearest_);
+  std::vector<float> caps_room, room;
+  candidate.support = count_support(levelled(candidate.distances, room), levelled(caps_, caps_room), tau_, nearest_);
   return {};
 }
 
@@ -261,8 +280,9 @@ Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallbac
 Expected<> MultiModel::deflate(const Candidate& candidate) {
   const std::vector<float>& distances = candidate.distances;
   nearest_.resize(distances.size(), std::numeric_limits<float>::infinity());
-  take_nearer(distances, nearest_);
-  swarm::deflate(distances, tau_, tail_reach(candidate.support), settings_.dead_zone_slope, caps_);
+  std::vector<float> room;
+  take_nearer(levelled(distances, room), nearest_);
+  swarm::deflate(distances, tau_, tail_reach(candidate.support), settings_.dead_zone_slope, caps_, allowed_);
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   return show(caps_);
 }

@@ -44,8 +44,9 @@ class MultiModel {
  public:
   /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are drawn
   /// from, and where the settings say so what swarms search. `evaluator` is given what is searched. `kinds` must outlive this.
+  /// `spread`: how many times the threshold each point may be off (noise_model.hpp); empty: once.
   MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points, const Part& part,
-             std::uint64_t seed, Limits limits);
+             std::uint64_t seed, Limits limits, std::span<const float> spread = {});
 
   /// Told of each step of each swarm; must outlive this. Null: nobody is.
   void watched_by(Watch* watch) noexcept { watch_ = watch; }
@@ -114,6 +115,8 @@ class MultiModel {
   void count_effort(FitResult& result) const;
   double elapsed_ms() const;
   double loss_of_nothing(std::span<const float> caps) const;
+  /// Distances or caps, one a point, in measures that make the threshold of each tau; in `room` where they are not so already.
+  std::span<const float> levelled(std::span<const float> values, std::vector<float>& room) const;
   bool shares_out() const noexcept;
   /// Do models of this kind end at the least absolute deviations themselves?
   bool sharpens(const models::ModelSpace& of) const noexcept;
@@ -152,9 +155,10 @@ class MultiModel {
   const bool part_searched_;
   std::vector<Landscape> landscapes_;  // of the points that are searched, one a kind
   float tau_;
-  Ground ground_, part_ground_;          // all points, and the part; as the first kind has it
-  std::vector<float> caps_, part_caps_;  // one a point; what is left to explain, in both kinds of deflation. The part's as shown last
-  std::vector<float> nearest_;           // one a point: how far the nearest found model is; empty until there is one
+  std::vector<float> allowed_, part_allowed_;  // tau of each point, and of the part's; empty: tau for all
+  Ground ground_, part_ground_;                // all points, and the part; as the first kind has it
+  std::vector<float> caps_, part_caps_;        // one a point; what is left to explain, in both kinds of deflation. The part's as shown last
+  std::vector<float> nearest_;                 // one a point: how far the nearest found model is, levelled; empty until there is one
   std::vector<models::Placed> found_, hidden_;
   std::vector<models::Position> proposals_;  // what the joint end may add to them
   std::vector<std::uint16_t> labels_;

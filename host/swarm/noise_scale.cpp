@@ -6,6 +6,7 @@
 
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
+#include "host/swarm/noise_model.hpp"
 #include "host/swarm/refinement.hpp"
 
 namespace swarmfit::swarm {
@@ -60,6 +61,7 @@ Expected<double> common_sigma(const Ground& ground, std::span<const models::Plac
     if (auto done = weigh(ground.of(*space), theta, {}, distances); !done) return tl::unexpected(done.error());
     take_nearer(distances, nearest);
   }
+  for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] *= ground.tau / ground.allowed_at(i);
   const auto tau = static_cast<double>(ground.tau);
   return gaussian_part(nearest, tau / kSigmas, 2 * tau);
 }
@@ -78,7 +80,7 @@ bool near(double a, double b, double share) { return std::abs(a - b) <= share * 
 }  // namespace
 
 Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
-                                        std::size_t finite_points, const FitOptions& options, Watch* watch) {
+                                        std::size_t finite_points, const FitOptions& options, Watch* watch, std::span<const float> spread) {
   std::vector<Kind> kinds = make_kinds(options);
   std::erase_if(kinds, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
   const double unit = points.frame().scale;
@@ -91,7 +93,7 @@ Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, co
     const Settings& settings = kinds.front().settings;
     Limits limits;
     limits.max_models = kModels;
-    MultiModel search(evaluator, kinds, points, part, options.seed + static_cast<std::uint64_t>(round) + 1, limits);
+    MultiModel search(evaluator, kinds, points, part, options.seed + static_cast<std::uint64_t>(round) + 1, limits, spread);
     search.watched_by(watch);
     FitResult result;
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
@@ -103,9 +105,11 @@ Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, co
     // The models follow the threshold and it follows them, without a search each time; the next search starts where they have come to.
     const double searched = tau;
     for (int step = 0; step < kSteps; ++step) {
-      const Ground ground{evaluator, *kinds.front().space, points, static_cast<float>(tau)};
+      const std::vector<float> allowed = allowed_by(spread, static_cast<float>(tau));
+      const Ground ground{
+          .evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = static_cast<float>(tau), .allowed = allowed};
       if (step > 0) {
-        for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = points.finite(i) ? ground.tau : 0.0F;
+        for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = points.finite(i) ? ground.allowed_at(i) : 0.0F;
         for (auto& [space, theta] : found) {
           if (auto done = refine_one(ground.of(*space), settings.loss, caps, theta); !done) return tl::unexpected(done.error());
         }

@@ -50,7 +50,7 @@ Expected<> MultiModel::polish() {
   }
   const auto refine_all = [&](float corner, int rounds) -> Expected<> {
     for (std::size_t m = 0; m < found_.size(); ++m) {
-      if (!distances.empty()) left_by_others(distances, m, tau_, caps_);
+      if (!distances.empty()) left_by_others(ground_, distances, m, caps_);
       Ground ground = ground_.of(*found_[m].space);
       ground.corner = corner;
       if (auto done = refine_one(ground, settings_.loss, caps_, found_[m].theta, rounds); !done) return tl::unexpected(done.error());
@@ -60,7 +60,7 @@ Expected<> MultiModel::polish() {
   if (auto done = refine_all(ground_.corner, full_rounds()); !done) return done;
   for (std::size_t m = 0; m < found_.size(); ++m) {
     if (!sharpens(*found_[m].space)) continue;
-    if (!distances.empty()) left_by_others(distances, m, tau_, caps_);
+    if (!distances.empty()) left_by_others(ground_, distances, m, caps_);
     if (auto done = run_through_points(found_[m]); !done) return done;
   }
   return {};
@@ -73,11 +73,13 @@ Expected<> MultiModel::run_through_points(models::Placed& model) {
       std::find_if(kinds_.begin(), kinds_.end(), [&](const Kind& k) { return k.space.get() == model.space; }) - kinds_.begin());
   std::vector<float> distances(points_.size());
   if (auto done = weigh(ground_.of(of), model.theta, caps_, distances); !done) return tl::unexpected(done.error());
-  const std::vector<std::uint32_t> near = nearest_first(distances, tau_, size);
+  std::vector<float> room;
+  const std::span<const float> level = levelled(distances, room);
+  const std::vector<std::uint32_t> near = nearest_first(level, tau_, size);
   if (near.size() <= size) return {};
   // Where two models cross, turning about their common point would lead from one to the other.
   std::vector<float> own = caps_;
-  for (std::size_t i = 0; i < own.size(); ++i) own[i] = distances[i] <= kOwn * tau_ ? own[i] : 0.0F;
+  for (std::size_t i = 0; i < own.size(); ++i) own[i] = level[i] <= kOwn * tau_ ? own[i] : 0.0F;
   if (auto done = show(own); !done) return done;
 
   Exchange best{model.theta, {near.begin(), near.begin() + static_cast<std::ptrdiff_t>(size)}, 0};

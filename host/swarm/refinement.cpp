@@ -24,7 +24,8 @@ double loss_of(const kernels::Evidence& evidence, Loss loss, std::span<const flo
 
 /// Sum over points of the distance to the nearest model, at most tau.
 Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models) {
-  std::vector<float> distances(ground.size()), least(ground.size(), ground.tau);
+  std::vector<float> distances(ground.size()), least(ground.size());
+  for (std::size_t i = 0; i < least.size(); ++i) least[i] = ground.allowed_at(i);
   for (const models::Placed& model : models) {
     if (auto done = weigh(ground.of(*model.space), model.theta, {}, distances); !done) return tl::unexpected(done.error());
     take_nearer(distances, least);
@@ -35,6 +36,13 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
 }
 
 }  // namespace
+
+kernels::Weighing Ground::weighing(std::span<const float> caps, float corner_of_tau) const {
+  if (allowed.empty()) return {tau, corner_of_tau, caps};
+  // Caps tell who is near enough; the tolerance is beyond them all, and the corner stays where it is.
+  const float widest = *std::max_element(allowed.begin(), allowed.end());
+  return {widest, corner_of_tau * (tau / widest), caps.empty() ? allowed : caps};
+}
 
 ModelRows::ModelRows(const models::Frame& frame, std::size_t most) : frame_(frame) {
   parameters_.reserve(most);  // the views look into it
@@ -56,14 +64,14 @@ Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& 
   const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
   kernels::Evidence evidence;
   const auto done =
-      ground.evaluator.weigh(ground.view(), {ground.tau, ground.corner, caps}, std::span(&model, 1), distances, std::span(&evidence, 1));
+      ground.evaluator.weigh(ground.view(), ground.weighing(caps, ground.corner), std::span(&model, 1), distances, std::span(&evidence, 1));
   if (!done) return tl::unexpected(to_error(done.error()));
   return evidence;
 }
 
 Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
   std::vector<kernels::Evidence> evidence(models.size());
-  if (auto done = ground.evaluator.weigh(ground.view(), {ground.tau, ground.corner, {}}, models, {}, evidence); !done) {
+  if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), models, {}, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
   return evidence;
@@ -77,7 +85,7 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
   std::vector<double> weight;
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float d = distances[i];
-    if (!(d <= ground.tau) || (!caps.empty() && d > caps[i])) continue;
+    if (!(d <= ground.allowed_at(i)) || (!caps.empty() && d > caps[i])) continue;
     index.push_back(ground.index(i));
     weight.push_back(1.0 / static_cast<double>(std::max(d / ground.tau, ground.corner)));
   }
@@ -117,8 +125,8 @@ Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::spa
   return all;
 }
 
-void left_by_others(const std::vector<std::vector<float>>& distances, std::size_t model, float tau, std::vector<float>& caps) {
-  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = std::isnan(distances[model][i]) ? 0.0F : tau;
+void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps) {
+  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = std::isnan(distances[model][i]) ? 0.0F : ground.allowed_at(i);
   for (std::size_t m = 0; m < distances.size(); ++m) {
     if (m != model) take_nearer(distances[m], caps);
   }
@@ -157,7 +165,7 @@ Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::spa
     const auto mine = static_cast<std::uint16_t>(m + 1);
     for (std::size_t i = 0; i < distances.size(); ++i) {
       const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;
-      owner[i] = distances[i] <= ground.tau ? taken : owner[i];
+      owner[i] = distances[i] <= ground.allowed_at(i) ? taken : owner[i];
     }
   }
   std::vector<std::size_t> unique(models.size(), 0);

@@ -18,10 +18,15 @@ struct Ground {
   const models::WorkingPoints& points;
   float tau;  ///< [data unit]
   const Subset* part = nullptr;
-  float corner = 0.1F;  ///< of tau: below this a residual weighs as in least squares, so that none weighs infinitely
+  float corner = 0.1F;                  ///< of tau: below this a residual weighs as in least squares, so that none weighs infinitely
+  std::span<const float> allowed = {};  ///< tau of each of the ground's points [data unit]; empty: tau for all
 
   /// The same for a model of another kind.
-  Ground of(const models::ModelSpace& other) const noexcept { return {evaluator, other, points, tau, part, corner}; }
+  Ground of(const models::ModelSpace& other) const noexcept { return {evaluator, other, points, tau, part, corner, allowed}; }
+  /// What the k-th point may be off.
+  float allowed_at(std::size_t k) const noexcept { return allowed.empty() ? tau : allowed[k]; }
+  /// Which points speak for a model, under `caps` or, where these are empty, under what the points may be off.
+  kernels::Weighing weighing(std::span<const float> caps, float corner_of_tau) const;
   std::size_t size() const noexcept { return part != nullptr ? part->index().size() : points.size(); }
   kernels::PointsView view() const noexcept { return part != nullptr ? part->view() : points.view(); }
   /// Input index of the k-th point.
@@ -71,8 +76,8 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
 /// Distances of the ground's points to each of several models, of whatever kinds; NaN where a point is not finite.
 Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models);
 
-/// What the other models leave of each of the ground's points: tau, or the distance to the nearest of them. `distances` as by measure().
-void left_by_others(const std::vector<std::vector<float>>& distances, std::size_t model, float tau, std::vector<float>& caps);
+/// What the other models leave of each of the ground's points: its tau, or the distance to the nearest of them. `distances` as by measure().
+void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps);
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
 /// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.

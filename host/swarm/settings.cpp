@@ -72,6 +72,14 @@ Expected<> check_own(const FitOptions& options) {
   return options.own->validate();
 }
 
+Expected<> check_noise(const FitOptions& options) {
+  const int columns = options.own ? options.own->dimension : dimension(options.model);
+  if (options.noise == Noise::none || columns == 3) return {};
+  return fail(Error::Kind::invalid_option,
+              fmt::format("noise is depth, must be none for {}: it is fitted to points of {} columns, and depth is the third of 3",
+                          name(options.model), columns));
+}
+
 bool has_direction(ModelType type) { return type == ModelType::line2d || type == ModelType::plane || type == ModelType::cylinder; }
 
 }  // namespace
@@ -99,6 +107,7 @@ Expected<> FitOptions::validate() const {
   }
   if (auto ok = check_own(*this); !ok) return ok;
   if (auto ok = check_rivals(*this); !ok) return ok;
+  if (auto ok = check_noise(*this); !ok) return ok;
   if (!prior) return {};
   const std::vector<ModelType> all = kinds();
   if (std::none_of(all.begin(), all.end(), has_direction)) {

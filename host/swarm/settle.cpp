@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "host/swarm/efficiency.hpp"
 
@@ -12,6 +13,32 @@ ModelRows rows_of(const Ground& ground, std::span<const models::Placed> models) 
   ModelRows rows(ground.points.frame(), models.size());
   for (const auto& [space, theta] : models) rows.add(*space, theta);
   return rows;
+}
+
+/// Labels where each point has a threshold of its own: the nearest model within it; and what each model's own points say of it.
+Expected<> claim_by_allowance(const Ground& whole, std::span<const kernels::ModelView> models, std::span<std::uint16_t> labels,
+                              std::span<kernels::Evidence> evidence) {
+  std::vector<float> distances(labels.size()), least(labels.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const auto done = whole.evaluator.weigh(whole.view(), whole.weighing({}, 1), models.subspan(m, 1), distances, evidence.subspan(m, 1));
+    if (!done) return tl::unexpected(to_error(done.error()));
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+      if (!(distances[i] <= whole.allowed[i]) || !(distances[i] < least[i])) continue;
+      least[i] = distances[i];
+      labels[i] = static_cast<std::uint16_t>(m + 1);
+    }
+  }
+  std::vector<float> own(labels.size());
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const double cost = evidence[m].cost;
+    // Under a cap of 0 a point has no say, unless it lies in the model to the last bit.
+    for (std::size_t i = 0; i < labels.size(); ++i) own[i] = labels[i] == m + 1 ? whole.allowed[i] : 0.0F;
+    const auto done = whole.evaluator.weigh(whole.view(), whole.weighing(own, 1), models.subspan(m, 1), {}, evidence.subspan(m, 1));
+    if (!done) return tl::unexpected(to_error(done.error()));
+    evidence[m].cost = cost;
+    evidence[m].count = static_cast<std::uint64_t>(std::count(labels.begin(), labels.end(), m + 1));
+  }
+  return {};
 }
 
 /// Counts and squares of the points that each model owns already.
@@ -67,7 +94,7 @@ Expected<> refit_apart(const Ground& whole, std::vector<models::Placed>& found, 
   if (!distances) return tl::unexpected(distances.error());
   std::vector<float> caps(whole.size()), own_distances(whole.size());
   for (std::size_t m = 0; m < found.size(); ++m) {
-    left_by_others(*distances, m, whole.tau, caps);
+    left_by_others(whole, *distances, m, caps);
     const Ground own = whole.of(*found[m].space);
     const auto evidence = weigh(own, found[m].theta, caps, own_distances);
     if (!evidence) return tl::unexpected(evidence.error());
@@ -111,7 +138,9 @@ Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found,
   std::vector<kernels::Evidence> evidence(found.size());
   if (result.labels.empty()) {
     result.labels.resize(whole.points.size());
-    if (auto done = whole.evaluator.claim(whole.view(), whole.tau, models.views(), result.labels, evidence); !done) {
+    if (!whole.allowed.empty()) {
+      if (auto done = claim_by_allowance(whole, models.views(), result.labels, evidence); !done) return done;
+    } else if (auto done = whole.evaluator.claim(whole.view(), whole.tau, models.views(), result.labels, evidence); !done) {
       return tl::unexpected(to_error(done.error()));
     }
   } else if (auto done = weigh_own(whole, models.views(), result.labels, evidence); !done) {
@@ -126,7 +155,8 @@ Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found,
     const auto& [space, theta] = found[m];
     model.type = space->type();
     model.covariance = space->covariance_to_data(covariance(whole.of(*space), evidence[m], result.labels, m + 1, theta), theta, frame);
-    if (space->residual_components() > 1) continue;
+    // Where each point has a threshold of its own, one deviation for all would not tell what is cut off.
+    if (space->residual_components() > 1 || !whole.allowed.empty()) continue;
     model.covariance *= variance_factor(static_cast<double>(whole.tau), static_cast<double>(corners[m]), model.rms);
   }
   return {};

@@ -72,6 +72,10 @@ bool set(FitOptions& o, std::string_view name, nb::handle value) {
     const std::string given = text(name, value);
     if (given != "fast" && given != "paper") refuse(name, value, "'fast' or 'paper'");
     o.preset = given == "fast" ? Preset::fast : Preset::paper;
+  } else if (name == "noise") {
+    const std::string given = text(name, value);
+    if (given != "none" && given != "depth") refuse(name, value, "'none' or 'depth'");
+    o.noise = given == "depth" ? Noise::depth : Noise::none;
   } else if (name == "deflation") {
     const std::string given = text(name, value);
     if (given != "residual" && given != "parametric") refuse(name, value, "'residual' or 'parametric'");

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         particles: SupportsIndex | None
         iterations: SupportsIndex | None
         stall: SupportsIndex | None
+        noise: str | None
         deflation: str | None
         lambda_: SupportsFloat | None
         loss: str | None

@@ -31,6 +31,12 @@ enum class Deflation {
 };
 enum class Loss { truncated_l1, truncated_l2 };
 
+/// How far off a point may be by its sensor's noise. Each point's own threshold follows.
+enum class Noise {
+  none,   ///< the same for all points
+  depth,  ///< grows with the square of the depth |z|: depth cameras, stereo; of points in the camera's frame
+};
+
 /// Only planes whose normal is within `max_angle` of `axis` (n and -n are one plane), or lines whose normal is, or cylinders whose axis is.
 struct DirectionPrior {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< need not be a unit vector; not zero
@@ -42,8 +48,9 @@ struct FitOptions {
   std::vector<ModelType> rivals;  ///< further kinds that compete with `model` for the same points; all of 2 or all of 3 columns, each once
   std::optional<OwnModel> own;    ///< with `model` = own, and only then: what is fitted; no rivals, and residual deflation
   std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane, sphere, cylinder 0.01;
-                                    ///< homography 6 px, fundamental 2.5 px; line2d, circle2d and own estimate it)
+                                    ///< homography 6 px, fundamental 2.5 px; line2d, circle2d, own, and any with noise, estimate it)
   bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
+  Noise noise = Noise::none;        ///< depth: of 3 columns only; tau is for the near end, beyond a tenth of the points
   Preset preset = Preset::fast;     ///< decides every option below that is left empty
   std::optional<int> particles;     ///< M, >= 2
   std::optional<int> iterations;    ///< most steps of one swarm, >= 1
