@@ -2,6 +2,7 @@
 #pragma once
 
 #include <swarmfit/backend.hpp>
+#include <swarmfit/batch.hpp>
 #include <swarmfit/bench.hpp>
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/error.hpp>

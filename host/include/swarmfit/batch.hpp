@@ -1,0 +1,20 @@
+// Many small clouds in one call.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <swarmfit/error.hpp>
+#include <swarmfit/export.hpp>
+#include <swarmfit/fit.hpp>
+#include <swarmfit/points.hpp>
+
+namespace swarmfit {
+
+/// Fits each cloud by itself, with the same options and seed: result k is that of fit(clouds[k], options), times apart, on any number of
+/// threads. On the processor FitOptions::threads clouds are worked on side by side (0: as many as there are cores), each in one thread; on
+/// a Vulkan device one after another, and a large cloud is better served there. A time budget is each cloud's own. One cloud's failure
+/// (bad_input, out_of_memory) is its own, too; the whole fails with invalid_option or backend_unavailable.
+SWARMFIT_API Expected<std::vector<Expected<FitResult>>> fit_batch(std::span<const PointsView> clouds, const FitOptions& options = {});
+
+}  // namespace swarmfit

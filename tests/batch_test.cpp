@@ -1,0 +1,108 @@
+// Many small clouds in one call: each answer is that of its own call.
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <swarmfit/batch.hpp>
+
+#include "host/bench/bench_case.hpp"
+
+namespace swarmfit {
+namespace {
+
+constexpr std::size_t kPoints = 300;
+
+struct Problems {
+  std::vector<std::vector<float>> values;
+  std::vector<PointsView> views;
+
+  explicit Problems(std::size_t count, ModelType type = ModelType::line2d) {
+    for (std::size_t k = 0; k < count; ++k) values.push_back(bench_internal::synthetic_points(type, kPoints, 100 + k));
+    for (const auto& rows : values) views.emplace_back(std::span<const float>(rows), dimension(type));
+  }
+};
+
+FitOptions small_fit(int threads, std::string backend = "cpu") {
+  FitOptions options;
+  options.model = ModelType::line2d;
+  options.threshold = 0.015;
+  options.backend = std::move(backend);
+  options.threads = threads;
+  return options;
+}
+
+void expect_same(const Expected<FitResult>& one, const Expected<FitResult>& other) {
+  ASSERT_TRUE(one && other);
+  EXPECT_EQ(one->labels, other->labels);
+  EXPECT_EQ(one->stop_reason, other->stop_reason);
+  EXPECT_EQ(one->evaluations, other->evaluations);
+  ASSERT_EQ(one->models.size(), other->models.size());
+  for (std::size_t m = 0; m < one->models.size(); ++m) {
+    EXPECT_EQ(one->models[m].parameters, other->models[m].parameters);
+    EXPECT_EQ(one->models[m].covariance, other->models[m].covariance);
+  }
+}
+
+TEST(Batch, GivesWhatEachCallGivesOnAnyNumberOfThreads) {
+  const Problems problems(150);
+  std::vector<Expected<FitResult>> alone;
+  std::size_t models = 0;
+  for (const PointsView& cloud : problems.views) {
+    alone.push_back(fit(cloud, small_fit(1)));
+    ASSERT_TRUE(alone.back()) << alone.back().error().message;
+    models += alone.back()->models.size();
+  }
+  EXPECT_GT(models, 2 * problems.views.size());
+  for (const int threads : {0, 1, 2, 4}) {
+    const auto together = fit_batch(problems.views, small_fit(threads));
+    ASSERT_TRUE(together) << together.error().message;
+    ASSERT_EQ(together->size(), alone.size());
+    for (std::size_t k = 0; k < alone.size(); ++k) expect_same(alone[k], (*together)[k]);
+  }
+}
+
+TEST(Batch, HoldsOnOtherBackEnds) {
+  const Problems problems(3);
+  for (const char* backend : {"reference", "vulkan"}) {
+    const auto together = fit_batch(problems.views, small_fit(0, backend));
+    if (!together && together.error().kind == Error::Kind::backend_unavailable) continue;
+    ASSERT_TRUE(together) << together.error().message;
+    for (std::size_t k = 0; k < problems.views.size(); ++k) expect_same(fit(problems.views[k], small_fit(0, backend)), (*together)[k]);
+  }
+}
+
+TEST(Batch, KeepsOneCloudsFailureToItself) {
+  Problems problems(20);
+  problems.views[3] = PointsView(std::span<const float>(problems.values[3]).first(2), 2);
+  problems.views[7] = PointsView(std::span<const float>(problems.values[7]), 3);
+  problems.views[19] = PointsView();
+  const auto together = fit_batch(problems.views, small_fit(2));
+  ASSERT_TRUE(together) << together.error().message;
+  for (std::size_t k = 0; k < problems.views.size(); ++k) {
+    const bool bad = k == 3 || k == 7 || k == 19;
+    ASSERT_EQ((*together)[k].has_value(), !bad) << k;
+    if (bad) {
+      EXPECT_EQ((*together)[k].error().kind, Error::Kind::bad_input) << k;
+      continue;
+    }
+    expect_same(fit(problems.views[k], small_fit(1)), (*together)[k]);
+  }
+}
+
+TEST(Batch, OfNothingIsNothingAndOfWrongOptionsAFailure) {
+  const auto nothing = fit_batch({}, small_fit(0));
+  ASSERT_TRUE(nothing);
+  EXPECT_TRUE(nothing->empty());
+  const Problems problems(2);
+  FitOptions wrong = small_fit(-1);
+  const auto refused = fit_batch(problems.views, wrong);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().message, "threads is -1, must be in [0, 4096]");
+  const auto absent = fit_batch(problems.views, small_fit(0, "abacus"));
+  ASSERT_FALSE(absent);
+  EXPECT_EQ(absent.error().kind, Error::Kind::backend_unavailable);
+}
+
+}  // namespace
+}  // namespace swarmfit
