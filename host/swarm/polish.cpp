@@ -8,8 +8,9 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr float kOwn = 2;       // tau: points farther from a model have no say in its last steps
-constexpr int kExchanges = 30;  // of one of the points that a model runs through, at most
+constexpr std::size_t kFewPoints = 2048;  // with more, what rounded corners leave of the deviations is nothing beside their own scatter
+constexpr float kOwn = 2;                 // tau: points farther from a model have no say in its last steps
+constexpr int kExchanges = 30;            // of one of the points that a model runs through, at most
 
 /// Places of the `count` smallest of the distances that are at most `tau`, smallest first, and then the rest of those in their order.
 std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float tau, std::size_t count) {
@@ -28,7 +29,8 @@ std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float
 
 bool MultiModel::sharpens(const models::ModelSpace& of) const noexcept {
   const bool asked = settings_.joint && settings_.sharpen && settings_.loss == Loss::truncated_l1;
-  return asked && !part_searched_ && !shares_out() && of.freedom() == of.minimal_sample();
+  const bool few = points_.finite_count() <= kFewPoints;
+  return asked && few && !part_searched_ && !shares_out() && of.freedom() == of.minimal_sample();
 }
 
 float MultiModel::corner(const models::ModelSpace& of) const noexcept {
