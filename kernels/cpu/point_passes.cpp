@@ -233,7 +233,8 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
     alignas(64) std::array<std::int32_t, kStripPoints> label;
     label.fill(0);
     bench.claimants.clear();
-    for (std::size_t i = 0; i < kStripPoints; ++i) nearest[i] = bench.strip.limit[i] >= 0 ? beyond : -1.0F;
+    nearest.fill(-1.0F);
+    for (std::size_t i = 0; i < bench.count; ++i) nearest[i] = bench.strip.limit[i] >= 0 ? beyond : -1.0F;
     const auto width = static_cast<std::size_t>(points.dimension);
     Evidence* const of_run = evidence_.data() + run * models.size();
     for (std::size_t m = 0; m < models.size(); ++m) {
