@@ -4,6 +4,11 @@
 
 namespace swarmfit::swarm {
 
+std::size_t place_of(const models::Placed& model, std::span<const Kind> kinds) {
+  const auto at = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& kind) { return kind.space.get() == model.space; });
+  return static_cast<std::size_t>(at - kinds.begin());
+}
+
 bool is_curved(ModelType type) noexcept { return type == ModelType::circle2d || type == ModelType::sphere || type == ModelType::cylinder; }
 
 ModelType flat_of(ModelType type) noexcept { return dimension(type) == 2 ? ModelType::line2d : ModelType::plane; }

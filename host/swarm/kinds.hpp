@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include <swarmfit/fit.hpp>
@@ -29,6 +30,9 @@ struct Known {
 std::vector<Kind> make_kinds(const FitOptions& options);
 /// Fills their settings in; as resolve() of one.
 void resolve(std::vector<Kind>& kinds, const FitOptions& options, std::size_t finite_points, double threshold);
+
+/// Which of the kinds a model that was found among them is of.
+std::size_t place_of(const models::Placed& model, std::span<const Kind> kinds);
 
 /// A circle, a sphere or a cylinder: with a large radius it is a line or a plane for all that the data can tell.
 bool is_curved(ModelType type) noexcept;

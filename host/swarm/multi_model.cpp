@@ -114,12 +114,12 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     }
   }
   for (const Known& model : known) {
-    if (!stop_reason_.empty() || interrupted() || (limits_.max_models > 0 && found_.size() >= limits_.max_models)) break;
+    if (!stop_reason_.empty() || interrupted() || full()) break;
     if (auto done = adopt(model, on_model, result); !done) return done;
   }
   int unpaid = 0;
   while (stop_reason_.empty()) {
-    if (limits_.max_models > 0 && found_.size() >= limits_.max_models) {
+    if (full()) {
       stop_reason_ = "max-models reached";
       break;
     }

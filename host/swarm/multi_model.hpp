@@ -117,6 +117,7 @@ class MultiModel {
   double loss_of_nothing(std::span<const float> caps) const;
   /// Distances or caps, one a point, in measures that make the threshold of each tau; in `room` where they are not so already.
   std::span<const float> levelled(std::span<const float> values, std::vector<float>& room) const;
+  bool full() const noexcept { return limits_.max_models > 0 && found_.size() >= limits_.max_models; }
   bool shares_out() const noexcept;
   /// Do models of this kind end at the least absolute deviations themselves?
   bool sharpens(const models::ModelSpace& of) const noexcept;

@@ -69,8 +69,7 @@ Expected<double> common_sigma(const Ground& ground, std::span<const models::Plac
 std::vector<Known> as_known(std::vector<models::Placed>& found, std::span<const Kind> kinds, const FitResult& result) {
   std::vector<Known> known;
   for (std::size_t m = 0; m < found.size(); ++m) {
-    const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& k) { return k.space.get() == found[m].space; });
-    known.push_back({static_cast<std::size_t>(kind - kinds.begin()), std::move(found[m].theta), result.models[m].iterations});
+    known.push_back({place_of(found[m], kinds), std::move(found[m].theta), result.models[m].iterations});
   }
   return known;
 }

@@ -50,19 +50,13 @@ Expected<> MultiModel::polish() {
     if (!measured) return tl::unexpected(measured.error());
     distances = std::move(*measured);
   }
-  const auto refine_all = [&](float corner, int rounds) -> Expected<> {
-    for (std::size_t m = 0; m < found_.size(); ++m) {
-      if (!distances.empty()) left_by_others(ground_, distances, m, caps_);
-      Ground ground = ground_.of(*found_[m].space);
-      ground.corner = corner;
-      if (auto done = refine_one(ground, settings_.loss, caps_, found_[m].theta, rounds); !done) return tl::unexpected(done.error());
-    }
-    return {};
-  };
-  if (auto done = refine_all(ground_.corner, full_rounds()); !done) return done;
   for (std::size_t m = 0; m < found_.size(); ++m) {
-    if (!sharpens(*found_[m].space)) continue;
+    const models::ModelSpace& of = *found_[m].space;
     if (!distances.empty()) left_by_others(ground_, distances, m, caps_);
+    if (auto done = refine_one(ground_.of(of), settings_.loss, caps_, found_[m].theta, full_rounds()); !done) {
+      return tl::unexpected(done.error());
+    }
+    if (!sharpens(of)) continue;
     if (auto done = run_through_points(found_[m]); !done) return done;
   }
   return {};
@@ -71,8 +65,7 @@ Expected<> MultiModel::polish() {
 Expected<> MultiModel::run_through_points(models::Placed& model) {
   const models::ModelSpace& of = *model.space;
   const auto size = static_cast<std::size_t>(of.minimal_sample());
-  const auto kind = static_cast<std::size_t>(
-      std::find_if(kinds_.begin(), kinds_.end(), [&](const Kind& k) { return k.space.get() == model.space; }) - kinds_.begin());
+  const std::size_t kind = place_of(model, kinds_);
   std::vector<float> distances(points_.size());
   if (auto done = weigh(ground_.of(of), model.theta, caps_, distances); !done) return tl::unexpected(done.error());
   std::vector<float> room;
