@@ -162,9 +162,7 @@ TEST(Fixation, AnyNumberOfThreadsGivesTheSame) {
     options.fit.threads = threads;
     EXPECT_EQ(segment_objects(c.input(), options), once);
   }
-  Case doubles = c;
-  doubles.scene.cloud.values64.assign(c.scene.cloud.values32.begin(), c.scene.cloud.values32.end());
-  doubles.scene.cloud.values32.clear();
+  const Case doubles = c.in_doubles();
   EXPECT_EQ(segment_objects(doubles.input(), options), once);
 }
 

@@ -18,6 +18,13 @@ struct Case {
   std::vector<std::uint16_t> planes, popout;
   std::vector<SpaceOfInterest> sois;
   perception::SegmentationInput input() const { return {scene.cloud, planes, popout, sois}; }
+  /// The same, its coordinates in double precision.
+  Case in_doubles() const {
+    Case other = *this;
+    other.scene.cloud.values64.assign(scene.cloud.values32.begin(), scene.cloud.values32.end());
+    other.scene.cloud.values32.clear();
+    return other;
+  }
 };
 
 inline Case make_case(std::uint64_t seed, int width = 640, int height = 480) {

@@ -296,9 +296,7 @@ TEST(Segmentation, RepeatsItselfAndTakesDoubles) {
     options.fit.preset = preset;
     const auto once = segment_objects(c.input(), options);
     EXPECT_EQ(segment_objects(c.input(), options), once);
-    Case doubles = c;
-    doubles.scene.cloud.values64.assign(c.scene.cloud.values32.begin(), c.scene.cloud.values32.end());
-    doubles.scene.cloud.values32.clear();
+    const Case doubles = c.in_doubles();
     EXPECT_EQ(segment_objects(doubles.input(), options), once);
   }
 }

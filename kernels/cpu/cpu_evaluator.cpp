@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <new>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -17,6 +15,7 @@
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/cpu/point_passes.hpp"
 #include "kernels/cpu/point_store.hpp"
+#include "kernels/cpu/processor.hpp"
 #include "kernels/cpu/swarm_costs.hpp"
 #include "kernels/evaluators.hpp"
 
@@ -24,8 +23,6 @@ namespace swarmfit::kernels {
 namespace {
 
 using namespace cpu;
-
-constexpr int kMaxThreads = 4096;
 
 std::vector<std::string> kernel_names() {
   std::vector<std::string> names;
@@ -41,20 +38,6 @@ bool same_ignoring_case(std::string_view a, std::string_view b) {
 
 /// Without the number of threads: a result is the same bytes on any.
 std::string device_name(const CpuKernels& kernels) { return fmt::format("CPU, {}", kernels.name); }
-
-/// That this process may run on. Not asked of TBB, which would start its scheduler.
-int processors() { return std::max(1, static_cast<int>(std::thread::hardware_concurrency())); }
-
-/// Work that may run out of memory, with the failure as a value.
-template <class Work>
-Result<> guarded(std::size_t points, Work&& work) {
-  try {
-    work();
-    return {};
-  } catch (const std::bad_alloc&) {
-    return fail(Failure::Kind::out_of_memory, fmt::format("host memory does not hold {} points", points));
-  }
-}
 
 class CpuEvaluator final : public FitnessEvaluator {
  public:
@@ -241,15 +224,11 @@ Result<> FitnessEvaluator::claim(const PointsView& points, float tolerance, std:
 }
 
 Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOptions& options) {
-  if (options.threads < 0 || options.threads > kMaxThreads) {
-    return fail(Failure::Kind::invalid, fmt::format("threads is {}, must be in [0, {}]", options.threads, kMaxThreads));
-  }
-  // More threads than processors would only be refused, aloud, by TBB.
-  const int most = processors();
-  const int threads = options.threads > 0 ? std::min(options.threads, most) : most;
+  const auto threads = choose_threads(options.threads);
+  if (!threads) return tl::unexpected(threads.error());
   for (const CpuKernels* kernels : available_kernels()) {
     if (options.simd.empty() || same_ignoring_case(options.simd, kernels->name))
-      return std::make_unique<CpuEvaluator>(*kernels, threads, options.pruning);
+      return std::make_unique<CpuEvaluator>(*kernels, *threads, options.pruning);
   }
   return fail(Failure::Kind::unavailable,
               fmt::format("simd is '{}', must be one of what this processor has: {}", options.simd, fmt::join(kernel_names(), ", ")));

@@ -2,16 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <new>
 #include <numeric>
 #include <optional>
-#include <thread>
 #include <vector>
 
-#include <fmt/format.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include "kernels/checks.hpp"
+#include "kernels/cpu/processor.hpp"
 #include "kernels/cpu/tasks.hpp"
 #include "kernels/evaluators.hpp"
 #include "kernels/own/own_passes.hpp"
@@ -20,7 +18,6 @@ namespace swarmfit::kernels {
 namespace {
 
 constexpr std::size_t kChunkPoints = 512;  // residuals asked for in one call of the user's function
-constexpr int kMaxThreads = 4096;
 
 class OwnEvaluator final : public FitnessEvaluator {
  public:
@@ -36,7 +33,7 @@ class OwnEvaluator final : public FitnessEvaluator {
   Result<> set_points(const PointsView& points) override {
     effort_ = {};
     if (auto ok = check_points(points); !ok) return ok;
-    return guarded(points.count, [&] {
+    return cpu::guarded(points.count, [&] {
       extent_ = measure(points);
       if (!own_->recentre) std::fill_n(extent_.centre, kMaxDimension, 0.0);
       dimension_ = points.dimension;
@@ -59,7 +56,7 @@ class OwnEvaluator final : public FitnessEvaluator {
 
   Result<> evaluate(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs) override {
     if (auto ok = check_swarm(swarm, dimension_, cutoffs, costs, own_.get()); !ok) return ok;
-    return guarded(input_.size(), [&] {
+    return cpu::guarded(input_.size(), [&] {
       const auto width = static_cast<std::size_t>(own_->parameter_count);
       std::vector<std::uint64_t> touched(swarm.count);
       each(swarm.count, cpu::worth_sharing(input_.size() * swarm.count), [&](std::size_t j) {
@@ -75,7 +72,7 @@ class OwnEvaluator final : public FitnessEvaluator {
   Result<> distances(const ModelView& model, std::span<float> distances) override {
     if (auto ok = check_model(model, dimension_, own_.get()); !ok) return ok;
     if (auto ok = check_size("distances.size()", distances.size(), extent_.finite.size()); !ok) return ok;
-    return guarded(input_.size(), [&] {
+    return cpu::guarded(input_.size(), [&] {
       std::fill(distances.begin(), distances.end(), std::numeric_limits<float>::quiet_NaN());
       const OwnDistances measure(*own_, model.parameters, extent_.centre);
       for_chunks([&](std::size_t first, std::span<const double> rows, std::span<double> near) {
@@ -87,7 +84,7 @@ class OwnEvaluator final : public FitnessEvaluator {
 
   Result<> assign(std::span<const ModelView> models, std::span<const float> tolerance, std::span<std::uint16_t> labels) override {
     if (auto ok = check_assign(models, dimension_, extent_.finite.size(), tolerance, labels, own_.get()); !ok) return ok;
-    return guarded(input_.size(), [&] {
+    return cpu::guarded(input_.size(), [&] {
       std::fill(labels.begin(), labels.end(), std::uint16_t{0});
       std::vector<OwnDistances> measures;
       for (const ModelView& model : models) measures.emplace_back(*own_, model.parameters, extent_.centre);
@@ -110,13 +107,13 @@ class OwnEvaluator final : public FitnessEvaluator {
 
   Result<> survey(const PointsView& points, Survey& survey) override {
     if (auto ok = check_points(points); !ok) return ok;
-    return guarded(points.count, [&] { survey_points(points, survey); });
+    return cpu::guarded(points.count, [&] { survey_points(points, survey); });
   }
 
   Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                  std::span<Evidence> evidence) override {
     if (auto ok = check_weigh(points, how, models, distances, evidence, own_.get()); !ok) return ok;
-    return guarded(points.count, [&] {
+    return cpu::guarded(points.count, [&] {
       run(points.count, [&](Sharing sharing) { weigh_own(*own_, points, how, models, distances, evidence, sharing); });
     });
   }
@@ -124,22 +121,12 @@ class OwnEvaluator final : public FitnessEvaluator {
   Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
                  std::span<Evidence> evidence) override {
     if (auto ok = check_claim(points, tolerance, models, labels, evidence, own_.get()); !ok) return ok;
-    return guarded(points.count, [&] {
+    return cpu::guarded(points.count, [&] {
       run(points.count, [&](Sharing sharing) { claim_own(*own_, points, tolerance, models, labels, evidence, sharing); });
     });
   }
 
  private:
-  template <class Work>
-  static Result<> guarded(std::size_t points, Work&& work) {
-    try {
-      work();
-      return {};
-    } catch (const std::bad_alloc&) {
-      return fail(Failure::Kind::out_of_memory, fmt::format("host memory does not hold {} points", points));
-    }
-  }
-
   /// work(sharing) where that is to be done.
   template <class Work>
   void run(std::size_t points, Work&& work) {
@@ -205,15 +192,12 @@ class OwnEvaluator final : public FitnessEvaluator {
 }  // namespace
 
 Result<std::unique_ptr<FitnessEvaluator>> make_own_evaluator(std::string_view backend, const EvaluatorOptions& options) {
-  if (options.threads < 0 || options.threads > kMaxThreads) {
-    return fail(Failure::Kind::invalid, fmt::format("threads is {}, must be in [0, {}]", options.threads, kMaxThreads));
-  }
+  const auto threads = cpu::choose_threads(options.threads);
+  if (!threads) return tl::unexpected(threads.error());
   if (backend == "reference") {
     return std::make_unique<OwnEvaluator>(options.own, Identity{"reference", "double precision, serial"}, std::nullopt);
   }
-  const int most = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const int threads = options.threads > 0 ? std::min(options.threads, most) : most;
-  return std::make_unique<OwnEvaluator>(options.own, Identity{"cpu", "CPU, double precision"}, threads);
+  return std::make_unique<OwnEvaluator>(options.own, Identity{"cpu", "CPU, double precision"}, *threads);
 }
 
 }  // namespace swarmfit::kernels
