@@ -11,6 +11,7 @@
 #include <cmath>
 #include <limits>
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "kernels/cpu/cpu_kernels.hpp"
@@ -58,6 +59,16 @@ HWY_INLINE Vector least(Vector magnitude, Vector limit) {
 #endif
 }
 
+/// The lesser of |distance| and a limit >= 0, or the limit where the distance is NaN.
+HWY_INLINE Vector clipped(Vector distance, Vector limit) {
+#if HWY_TARGET <= HWY_AVX3
+  constexpr int kLeastMagnitude = 2, kClearSign = 2 << 2;
+  return Vector{_mm512_range_ps(distance.raw, limit.raw, kClearSign | kLeastMagnitude)};  // both in one instruction
+#else
+  return least(hn::Abs(distance), limit);
+#endif
+}
+
 template <Loss loss>
 HWY_INLINE Vector limit_of(Vector cap) {
   return loss == Loss::truncated_l1 ? cap : hn::Mul(cap, cap);
@@ -65,33 +76,66 @@ HWY_INLINE Vector limit_of(Vector cap) {
 
 template <Loss loss>
 HWY_INLINE Vector loss_of(Vector distance, Vector limit) {
-  return least(loss == Loss::truncated_l1 ? hn::Abs(distance) : hn::Mul(distance, distance), limit);
+  return loss == Loss::truncated_l1 ? clipped(distance, limit) : least(hn::Mul(distance, distance), limit);
 }
 
-/// Lane sums of one block for `P` models held in registers. Two accumulators a model hide the addition's latency; their order is part
-/// of the answer and the same for every P.
-template <class Model, Loss loss, int P>
-HWY_INLINE void block_sums(const TileView& tile, std::size_t first, const float* const* coefficients, Vector* total) {
+constexpr bool kManyRegisters = HWY_TARGET <= HWY_AVX3;
+
+/// Models per register tile: with fewer registers, fewer; one where a residual keeps the processor busy by itself.
+template <class Model>
+constexpr std::size_t models_at_once() {
+  if (!Model::traits.affine) return 1;
+  return kManyRegisters ? 4 : 2;
+}
+
+/// A model's accumulators: few lanes add up many losses each, and two round them less. Their order is part of the answer.
+constexpr std::size_t kAccumulators = lanes() < 8 ? 2 : 1;
+
+HWY_INLINE Vector total_of(const Vector (&sum)[kAccumulators]) {
+  Vector total = sum[0];
+  for (std::size_t a = 1; a < kAccumulators; ++a) total = hn::Add(total, sum[a]);
+  return total;
+}
+
+/// Loaded once, however often it is used: compilers would rather load for each use, and then loads are what the loop waits for.
+HWY_INLINE Vector load_once(const float* from) {
+  Vector v = hn::Load(FloatTag(), from);
+#if HWY_TARGET <= HWY_AVX3 && (HWY_COMPILER_GCC || HWY_COMPILER_CLANG)
+  asm("" : "+v"(v.raw));
+#endif
+  return v;
+}
+
+/// Lane sums of one block for the `P` models whose coefficients are in registers, in the same order for every P.
+template <class Model, Loss loss, int P, std::size_t C>
+HWY_INLINE void block_sums(const TileView& tile, std::size_t first, const Vector (&k)[P][C], Vector* total) {
   constexpr int D = Model::traits.dimension;
-  constexpr int C = Model::traits.coefficient_count;
-  constexpr std::size_t L = lanes();
+  constexpr std::size_t L = lanes(), A = kAccumulators;
   const FloatTag d;
   const VectorMath math;
-  Vector k[P][C];
-  Vector sum[P][2];
+  Vector sum[P][A];
   for (int p = 0; p < P; ++p) {
-    for (int c = 0; c < C; ++c) k[p][c] = hn::Set(d, coefficients[p][c]);
-    sum[p][0] = sum[p][1] = hn::Zero(d);
+    for (std::size_t a = 0; a < A; ++a) sum[p][a] = hn::Zero(d);
   }
-  for (std::size_t i = first; i < first + kBlockPoints; i += 2 * L) {
-    for (std::size_t half = 0; half < 2; ++half) {
-      Vector x[D];
-      for (int column = 0; column < D; ++column) x[column] = hn::Load(d, tile.columns[column] + i + half * L);
-      const Vector limit = limit_of<loss>(hn::Load(d, tile.caps + i + half * L));
-      for (int p = 0; p < P; ++p) sum[p][half] = hn::Add(sum[p][half], loss_of<loss>(Model::residual(math, x, k[p]), limit));
+  for (std::size_t i = first; i < first + kBlockPoints; i += A * L) {
+    for (std::size_t a = 0; a < A; ++a) {
+      Vector x[D], r[P];
+      for (int column = 0; column < D; ++column) x[column] = load_once(tile.columns[column] + i + a * L);
+      const Vector limit = limit_of<loss>(load_once(tile.caps + i + a * L));
+      for (int p = 0; p < P; ++p) r[p] = Model::residual(math, x, k[p]);
+      for (int p = 0; p < P; ++p) sum[p][a] = hn::Add(sum[p][a], loss_of<loss>(r[p], limit));
     }
   }
-  for (int p = 0; p < P; ++p) total[p] = hn::Add(sum[p][0], sum[p][1]);
+  for (int p = 0; p < P; ++p) total[p] = total_of(sum[p]);
+}
+
+/// Of numbers that an int holds.
+HWY_INLINE hn::Vec<BitsTag> nearest_int(Vector value) {
+#if HWY_TARGET <= HWY_AVX3
+  return hn::Vec<BitsTag>{_mm512_cvtps_epi32(value.raw)};  // Highway's minds what overflows as well
+#else
+  return hn::NearestInt(value);
+#endif
 }
 
 /// Whole quanta: exact however they are added up.
@@ -99,10 +143,11 @@ struct QuantumSums {
   using Lane = std::int32_t;
   static HWY_INLINE void add(Vector lane_sums, Vector scale, Lane* HWY_RESTRICT to) {
     const BitsTag d;
-    hn::Store(hn::Add(hn::Load(d, to), hn::NearestInt(hn::Mul(lane_sums, scale))), d, to);
+    hn::Store(hn::Add(hn::Load(d, to), nearest_int(hn::Mul(lane_sums, scale))), d, to);
   }
-  static void finish(const Lane* from, PartialCost& cost) {
-    for (std::size_t lane = 0; lane < lanes(); ++lane) cost.units += from[lane];
+  static HWY_INLINE void finish(const Lane* from, PartialCost& cost) {
+    const BitsTag d;
+    cost.units += hn::GetLane(hn::SumOfLanes(d, hn::Load(d, from)));  // of a tile: no more than an int holds
   }
 };
 
@@ -113,34 +158,70 @@ struct FloatSums {
     const FloatTag d;
     hn::Store(hn::Add(hn::Load(d, to), lane_sums), d, to);
   }
-  static void finish(const Lane* from, PartialCost& cost) {
+  static HWY_INLINE void finish(const Lane* from, PartialCost& cost) {
     for (std::size_t lane = 0; lane < lanes(); ++lane) cost.value += static_cast<double>(from[lane]);
   }
 };
 
-/// Models per register tile: with fewer registers, fewer; one where a residual keeps the processor busy by itself.
-template <class Model>
-constexpr std::size_t models_at_once() {
-  if (!Model::traits.affine) return 1;
-  return HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL ? 4 : 2;
-}
+/// Blocks of a tile that models pass over one after the other. With those fetched for the next run they fill the first-level cache.
+constexpr std::size_t kRunBlocks = 4;
+struct BlockRun {
+  std::size_t first, last;
+};
 
+/// `P` models over a run of blocks.
 template <class Model, Loss loss, class Sums, int P>
-HWY_INLINE void add_block(const TileView& tile, std::size_t block, Vector scale, const float* const* coefficients,
-                          typename Sums::Lane* const* sums) {
-  Vector total[P];
-  block_sums<Model, loss, P>(tile, block * kBlockPoints, coefficients, total);
-  for (int p = 0; p < P; ++p) Sums::add(total[p], scale, sums[p]);
+HWY_INLINE void add_run(const TileView& tile, BlockRun run, Vector scale, const float* const* coefficients,
+                        typename Sums::Lane* const* sums) {
+  constexpr std::size_t C = Model::traits.coefficient_count;
+  Vector k[P][C];
+  for (int p = 0; p < P; ++p) {
+    for (std::size_t c = 0; c < C; ++c) k[p][c] = hn::Set(FloatTag(), coefficients[p][c]);
+  }
+  for (std::size_t block = run.first; block < run.last; ++block) {
+    Vector total[P];
+    block_sums<Model, loss, P, C>(tile, block * kBlockPoints, k, total);
+    for (int p = 0; p < P; ++p) Sums::add(total[p], scale, sums[p]);
+  }
 }
 
-/// One block and the listed models, as many at once as the registers hold.
+/// Asks for `count` points of every column from `first` on, so that they are near when their turn comes. Past the end does no harm.
+template <class Model>
+HWY_INLINE void fetch(const TileView& tile, std::size_t first, std::size_t count) {
+  constexpr std::size_t kLine = 64 / sizeof(float);
+  for (std::size_t i = first; i < first + count; i += kLine) {
+    for (int column = 0; column < Model::traits.dimension; ++column) hwy::Prefetch(tile.columns[column] + i);
+    hwy::Prefetch(tile.caps + i);
+  }
+}
+
+/// A run of blocks and the listed models, as many at once as the registers hold.
 template <class Model, Loss loss, class Sums>
-HWY_INLINE void add_listed(const TileView& tile, std::size_t block, Vector scale, const float* const* coefficients,
+HWY_INLINE void add_listed(const TileView& tile, BlockRun run, Vector scale, const float* const* coefficients,
                            typename Sums::Lane* const* sums, std::size_t models) {
   constexpr std::size_t P = models_at_once<Model>();
   std::size_t j = 0;
-  for (; j + P <= models; j += P) add_block<Model, loss, Sums, P>(tile, block, scale, coefficients + j, sums + j);
-  for (; j < models; ++j) add_block<Model, loss, Sums, 1>(tile, block, scale, coefficients + j, sums + j);
+  for (; j + P <= models; j += P) add_run<Model, loss, Sums, P>(tile, run, scale, coefficients + j, sums + j);
+  if constexpr (P > 2) {
+    for (; j + 2 <= models; j += 2) add_run<Model, loss, Sums, 2>(tile, run, scale, coefficients + j, sums + j);
+  }
+  for (; j < models; ++j) add_run<Model, loss, Sums, 1>(tile, run, scale, coefficients + j, sums + j);
+}
+
+/// All models over the tile, run by run; while they pass over one, the next is fetched, a share for each few models.
+template <class Model, Loss loss, class Sums>
+HWY_INLINE void add_all(const TileView& tile, Vector scale, const float* const* coefficients, typename Sums::Lane* const* sums,
+                        std::size_t models) {
+  constexpr std::size_t kFew = 2 * models_at_once<Model>();
+  for (std::size_t first = 0; first < tile.blocks; first += kRunBlocks) {
+    const BlockRun run{first, std::min(tile.blocks, first + kRunBlocks)};
+    const std::size_t share = (run.last - run.first) * kBlockPoints * std::min(kFew, models) / models;
+    std::size_t ahead = run.last * kBlockPoints;
+    for (std::size_t j = 0; j < models; j += kFew, ahead += share) {
+      fetch<Model>(tile, ahead, share);
+      add_listed<Model, loss, Sums>(tile, run, scale, coefficients + j, sums + j, std::min(kFew, models - j));
+    }
+  }
 }
 
 /// `blocks`: null for all, else a bit a block for each model.
@@ -149,7 +230,8 @@ HWY_INLINE void add_costs_of(const TileView& tile, float scale, const float* HWY
                              const std::uint8_t* blocks, PartialCost* HWY_RESTRICT costs) {
   using Lane = typename Sums::Lane;
   constexpr std::size_t C = Model::traits.coefficient_count;
-  HWY_ALIGN Lane sums[kGroupModels * lanes()] = {};
+  HWY_ALIGN Lane sums[kGroupModels * lanes()];
+  std::fill_n(sums, models * lanes(), Lane{0});
   const Vector scales = hn::Set(FloatTag(), scale);
   const float* rows[kGroupModels];
   Lane* places[kGroupModels];
@@ -161,15 +243,14 @@ HWY_INLINE void add_costs_of(const TileView& tile, float scale, const float* HWY
   };
   if (blocks == nullptr) {
     for (std::size_t j = 0; j < models; ++j) list(j);
+    add_all<Model, loss, Sums>(tile, scales, rows, places, models);
   }
-  for (std::size_t block = 0; block < tile.blocks; ++block) {
-    if (blocks != nullptr) {
-      listed = 0;
-      for (std::size_t j = 0; j < models; ++j) {
-        if (((blocks[j] >> block) & 1U) != 0) list(j);
-      }
+  for (std::size_t block = 0; blocks != nullptr && block < tile.blocks; ++block) {
+    listed = 0;
+    for (std::size_t j = 0; j < models; ++j) {
+      if (((blocks[j] >> block) & 1U) != 0) list(j);
     }
-    add_listed<Model, loss, Sums>(tile, block, scales, rows, places, listed);
+    add_listed<Model, loss, Sums>(tile, {block, block + 1}, scales, rows, places, listed);
   }
   for (std::size_t j = 0; j < models; ++j) Sums::finish(sums + j * lanes(), costs[j]);
 }
@@ -201,13 +282,14 @@ template <Loss loss>
 HWY_INLINE void cap_units_of(const TileView& tile, float scale, std::int32_t* units) {
   const FloatTag d;
   for (std::size_t block = 0; block < tile.blocks; ++block) {
-    Vector sum[2] = {hn::Zero(d), hn::Zero(d)};
+    Vector sum[kAccumulators];
+    for (Vector& s : sum) s = hn::Zero(d);
     const float* caps = tile.caps + block * kBlockPoints;
-    for (std::size_t i = 0; i < kBlockPoints; i += 2 * lanes()) {
-      for (std::size_t half = 0; half < 2; ++half) sum[half] = hn::Add(sum[half], limit_of<loss>(hn::Load(d, caps + i + half * lanes())));
+    for (std::size_t i = 0; i < kBlockPoints; i += kAccumulators * lanes()) {
+      for (std::size_t a = 0; a < kAccumulators; ++a) sum[a] = hn::Add(sum[a], limit_of<loss>(hn::Load(d, caps + i + a * lanes())));
     }
     HWY_ALIGN std::int32_t lane_units[lanes()] = {};
-    QuantumSums::add(hn::Add(sum[0], sum[1]), hn::Set(d, scale), lane_units);
+    QuantumSums::add(total_of(sum), hn::Set(d, scale), lane_units);
     units[block] = 0;
     for (const std::int32_t lane : lane_units) units[block] += lane;
   }
@@ -366,7 +448,10 @@ double spin_fma(std::size_t rounds, float* sink) {
   const FloatTag d;
   const Vector factor = hn::Set(d, 0.999F);
   const Vector term = hn::Set(d, 1e-3F);
-  Vector a0 = term, a1 = term, a2 = term, a3 = term, a4 = term, a5 = term, a6 = term, a7 = term, a8 = term, a9 = term;
+  // Each starts elsewhere: compilers make one chain of equal ones.
+  const auto start = [&](float value) HWY_ATTR { return hn::Set(d, value); };
+  Vector a0 = start(0), a1 = start(1), a2 = start(2), a3 = start(3), a4 = start(4), a5 = start(5), a6 = start(6), a7 = start(7),
+         a8 = start(8), a9 = start(9);
   for (std::size_t i = 0; i < rounds; ++i) {
     a0 = hn::MulAdd(a0, factor, term);
     a1 = hn::MulAdd(a1, factor, term);

@@ -19,7 +19,7 @@ inline constexpr std::size_t kTilePoints = kBlockPoints * kTileBlocks;
 /// Most lanes of any vector.
 inline constexpr std::size_t kMaxLanes = 16;
 /// Models whose partial sums are kept side by side while they pass over a tile.
-inline constexpr std::size_t kGroupModels = 32;
+inline constexpr std::size_t kGroupModels = 128;
 
 /// A model's cost over part of the cloud. In the exact form, `units` counts quanta: a block's lane sums are rounded to whole ones, so that
 /// sums over blocks may be taken in any order, and by any number of threads, with the same outcome. Where caps are so much larger than

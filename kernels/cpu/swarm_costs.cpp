@@ -27,13 +27,19 @@ struct Runs {
   std::size_t points, tiles, length, count;
 };
 
+std::size_t groups_of(std::size_t models) { return (models + kGroupModels - 1) / kGroupModels; }
+
 /// body(task, run, first model, models) for each run of tiles and group of models.
 template <class Body>
 void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
-  const std::size_t groups = (models + kGroupModels - 1) / kGroupModels, tasks = runs.count * groups;
+  const std::size_t groups = groups_of(models), tasks = runs.count * groups;
+  // Alike in size, and whole register tiles but for the last group.
+  constexpr std::size_t kMultiple = 8;
+  static_assert(kGroupModels % kMultiple == 0);
+  const std::size_t even = groups > 0 ? (models + groups - 1) / groups : 0, size = (even + kMultiple - 1) / kMultiple * kMultiple;
   const auto one = [&](std::size_t task) {
-    const std::size_t first = task % groups * kGroupModels;
-    body(task, task / groups, first, std::min(kGroupModels, models - first));
+    const std::size_t first = task % groups * size;
+    body(task, task / groups, first, std::min(size, models - first));
   };
   if (worth_sharing(runs.points, models)) {
     for_each_task(tasks, one);
@@ -160,7 +166,7 @@ std::uint64_t SwarmCosts::add_open(const PointStore& points, const CentredSwarm&
     std::copy_n(swarm.coefficients.data() + alive_[a] * width, width, alive_coefficients_.data() + a * width);
   }
   partial_.assign(runs.count * alive_.size(), {});
-  touched_.assign(runs.count * ((alive_.size() + kGroupModels - 1) / kGroupModels), 0);
+  touched_.assign(runs.count * groups_of(alive_.size()), 0);
   for_tasks(runs, alive_.size(), [&](std::size_t task, std::size_t run, std::size_t first, std::size_t models) {
     std::array<std::uint8_t, kGroupModels> bits{};
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
