@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include <oneapi/tbb/parallel_for.h>
+#include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels {
 namespace {
@@ -81,8 +81,7 @@ std::span<const std::uint32_t> MortonOrder::sort(std::span<const float* const> c
   const std::size_t chunk_rows = std::max(kLeastChunk, (count + kMostChunks - 1) / kMostChunks);
   const std::size_t chunks = (count + chunk_rows - 1) / chunk_rows;
   const auto for_chunks = [&](auto&& body) {
-    tbb::parallel_for(std::size_t{0}, chunks,
-                      [&](std::size_t chunk) { body(chunk, chunk * chunk_rows, std::min(count, (chunk + 1) * chunk_rows)); });
+    cpu::for_each_task(chunks, [&](std::size_t chunk) { body(chunk, chunk * chunk_rows, std::min(count, (chunk + 1) * chunk_rows)); });
   };
 
   std::array<float, 3> low{};

@@ -16,7 +16,7 @@ namespace swarmfit::kernels {
 inline constexpr std::size_t kBlockPoints = 256;
 
 /// Positions in Morton order: neighbours in the list are neighbours in space. `columns` hold `count` finite coordinates each, 2 or 3 of
-/// them. A stable parallel radix sort over cells; points far from where most are share the outermost cells. Works in the caller's arena.
+/// them. A stable parallel radix sort over cells; points far from where most are share the outermost cells. Works in the caller's crew.
 class MortonOrder {
  public:
   std::span<const std::uint32_t> sort(std::span<const float* const> columns, std::size_t count);

@@ -42,23 +42,30 @@ WorkingPoints::WorkingPoints(const PointsView& points, kernels::Survey survey) :
   for (int d = 0; d < 4; ++d) rank_ += spread[d] > 1e-12 * size ? 1 : 0;
 }
 
+namespace {
+
+/// Which bit of a word is the one after `before` others, of at least that many.
+std::size_t bit_after(std::uint64_t bits, std::size_t before) {
+  for (; before > 0; --before) bits &= bits - 1;
+  return static_cast<std::size_t>(std::countr_zero(bits));
+}
+
+}  // namespace
+
 std::vector<std::uint32_t> WorkingPoints::finite_at(std::span<const std::size_t> places) const {
-  std::vector<std::uint32_t> found;
-  found.reserve(places.size());
-  if (places.empty()) return found;
-  // Places rise: each word is counted once and each of its bits passed once.
-  std::size_t word = 0, before = 0, passed = 0;  // finite points in the words before, and passed in this one
-  std::uint64_t bits = survey_.finite[0];
-  auto here = static_cast<std::size_t>(std::popcount(bits));
-  for (const std::size_t place : places) {
-    while (before + here <= place) {
+  constexpr std::size_t kWord = 64;
+  std::vector<std::uint32_t> found(places.size());
+  std::size_t word = 0, before = 0;  // finite points in the words before
+  std::size_t here = survey_.finite.empty() ? 0 : static_cast<std::size_t>(std::popcount(survey_.finite[0]));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    while (before + here <= places[k]) {
       before += here;
-      bits = survey_.finite[++word];
-      here = static_cast<std::size_t>(std::popcount(bits));
-      passed = 0;
+      const std::uint64_t bits = survey_.finite[++word];
+      // Most words of a dense cloud are full.
+      here = bits == ~std::uint64_t{0} ? kWord : static_cast<std::size_t>(std::popcount(bits));
     }
-    for (; passed < place - before; ++passed) bits &= bits - 1;
-    found.push_back(static_cast<std::uint32_t>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+    const std::size_t rank = places[k] - before;
+    found[k] = static_cast<std::uint32_t>(word * kWord + (here == kWord ? rank : bit_after(survey_.finite[word], rank)));
   }
   return found;
 }

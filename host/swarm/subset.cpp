@@ -4,35 +4,64 @@
 #include <array>
 #include <cstring>
 #include <numeric>
-#include <utility>
 
 namespace swarmfit::swarm {
 namespace {
 
+constexpr int kCellBits = 16;  // of a column
+
+/// Every bit of a byte followed by `gap` zeros.
+constexpr std::array<std::uint32_t, 256> spread_bytes(int gap) {
+  std::array<std::uint32_t, 256> spread{};
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    for (int bit = 0; bit < 8; ++bit) spread[byte] |= ((byte >> bit) & 1U) << (bit * (gap + 1));
+  }
+  return spread;
+}
+constexpr std::array<std::array<std::uint32_t, 256>, models::kMaxDimension> kSpread{spread_bytes(0), spread_bytes(1), spread_bytes(2),
+                                                                                    spread_bytes(3)};
+
 /// Interleaves the bits of the quantised columns.
 std::uint64_t morton(const models::WorkingPoints& points, std::size_t i) {
   const int dim = points.dimension();
-  constexpr int bits = 16;
-  std::array<std::uint32_t, models::kMaxDimension> cell{};
+  const auto& spread = kSpread[static_cast<std::size_t>(dim - 1)];
+  std::uint64_t code = 0;
   for (int d = 0; d < dim; ++d) {
     // The working frame has unit spread: +-4 holds all but far outliers, which are clamped.
     const double t = std::clamp((points.at(i, d) + 4.0) / 8.0, 0.0, 1.0);
-    cell[static_cast<std::size_t>(d)] = static_cast<std::uint32_t>(t * ((1U << bits) - 1U));
-  }
-  std::uint64_t code = 0;
-  for (int b = bits - 1; b >= 0; --b) {
-    for (int d = 0; d < dim; ++d) code = (code << 1) | ((cell[static_cast<std::size_t>(d)] >> b) & 1U);
+    const auto cell = static_cast<std::uint32_t>(t * ((1U << kCellBits) - 1U));
+    const std::uint64_t low = spread[cell & 255U], high = spread[cell >> 8];
+    code |= (high << (8 * dim) | low) << (dim - 1 - d);
   }
   return code;
 }
 
+struct Coded {
+  std::uint64_t code;
+  std::uint32_t index;
+};
+
+/// Sorts by code; what has the same stays in its order. A digit at a time, from the lowest.
+void sort_by_code(std::vector<Coded>& coded, int bits) {
+  constexpr int kDigitBits = 11;
+  constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+  std::vector<Coded> room(coded.size());
+  for (int shift = 0; shift < bits; shift += kDigitBits) {
+    std::array<std::uint32_t, kDigits> at{};
+    const auto digit = [&](const Coded& one) { return (one.code >> shift) & (kDigits - 1); };
+    for (const Coded& one : coded) ++at[digit(one)];
+    std::exclusive_scan(at.begin(), at.end(), at.begin(), 0U);
+    for (const Coded& one : coded) room[at[digit(one)]++] = one;
+    coded.swap(room);
+  }
+}
+
 std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part) {
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> coded;
-  coded.reserve(part.size());
-  for (const std::uint32_t i : part) coded.emplace_back(morton(points, i), i);
-  std::sort(coded.begin(), coded.end());
+  std::vector<Coded> coded(part.size());
+  std::transform(part.begin(), part.end(), coded.begin(), [&](std::uint32_t i) { return Coded{morton(points, i), i}; });
+  sort_by_code(coded, kCellBits * points.dimension());
   std::vector<std::uint32_t> index(coded.size());
-  std::transform(coded.begin(), coded.end(), index.begin(), [](const auto& one) { return one.second; });
+  std::transform(coded.begin(), coded.end(), index.begin(), [](const Coded& one) { return one.index; });
   return index;
 }
 
@@ -41,12 +70,22 @@ std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, 
 std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size) {
   const std::size_t n = points.finite_count();
   std::vector<std::size_t> places(std::min(n, size));
-  std::iota(places.begin(), places.end(), std::size_t{0});
+  const std::size_t runs = places.size();
+  if (runs == n) {
+    std::iota(places.begin(), places.end(), std::size_t{0});
+    return points.finite_at(places);
+  }
+  // Run k begins at floor(n k / runs).
+  const std::size_t whole = n / runs, rest = n % runs;
   std::array<std::uint32_t, 4> words{};
-  for (std::size_t k = 0; k < places.size() && places.size() < n; ++k) {
+  std::size_t from = 0, over = 0;
+  for (std::size_t k = 0; k < runs; ++k) {
     if (k % 4 == 0) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / 4));
-    const std::size_t from = n * k / places.size(), to = n * (k + 1) / places.size();
-    places[k] = from + Random::below(words[k % 4], to - from);
+    over += rest;
+    const std::size_t length = whole + (over >= runs ? 1 : 0);
+    if (over >= runs) over -= runs;
+    places[k] = from + Random::below(words[k % 4], length);
+    from += length;
   }
   return points.finite_at(places);
 }

@@ -9,7 +9,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include "kernels/checks.hpp"
 #include "kernels/cpu/cpu_kernels.hpp"
@@ -17,6 +16,7 @@
 #include "kernels/cpu/point_store.hpp"
 #include "kernels/cpu/processor.hpp"
 #include "kernels/cpu/swarm_costs.hpp"
+#include "kernels/cpu/tasks.hpp"
 #include "kernels/evaluators.hpp"
 
 namespace swarmfit::kernels {
@@ -42,10 +42,7 @@ std::string device_name(const CpuKernels& kernels) { return fmt::format("CPU, {}
 class CpuEvaluator final : public FitnessEvaluator {
  public:
   CpuEvaluator(const CpuKernels& kernels, int threads, bool pruning)
-      : kernels_(kernels), arena_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning), passes_(kernels) {
-    // Here and not in the first fit: what TBB looks up about the machine takes milliseconds, once.
-    arena_.initialize();
-  }
+      : kernels_(kernels), crew_(threads), identity_{"cpu", device_name(kernels)}, costs_(kernels, pruning), passes_(kernels) {}
 
   const Identity& identity() const noexcept override { return identity_; }
   Support supports(const Workload& workload) const override {
@@ -58,7 +55,7 @@ class CpuEvaluator final : public FitnessEvaluator {
     effort_ = {};
     costs_.forget();
     if (auto ok = check_points(points); !ok) return ok;
-    return guarded(points.count, [&] { run_in(arena_, worth_sharing(points.count), [&] { store_.assign(points); }); });
+    return guarded(points.count, [&] { run_in(crew_, worth_sharing(points.count), [&] { store_.assign(points); }); });
   }
 
   Result<> set_caps(std::span<const float> caps) override {
@@ -70,7 +67,7 @@ class CpuEvaluator final : public FitnessEvaluator {
       }
     }
     costs_.forget();
-    run_in(arena_, worth_sharing(store_.count()), [&] { store_.set_caps(caps); });
+    run_in(crew_, worth_sharing(store_.count()), [&] { store_.set_caps(caps); });
     return {};
   }
 
@@ -80,7 +77,7 @@ class CpuEvaluator final : public FitnessEvaluator {
       centre(swarm);
       const CentredSwarm centred{swarm.kind, swarm.count, coefficients_, finite_, cutoffs};
       const auto work = [&] { effort_.touched += costs_.evaluate(store_, centred, loss, costs); };
-      run_in(arena_, worth_sharing(store_.finite(), swarm.count), work);
+      run_in(crew_, worth_sharing(store_.finite(), swarm.count), work);
       effort_.evaluations += swarm.count;
       effort_.point_models += swarm.count * store_.finite();
     });
@@ -92,7 +89,7 @@ class CpuEvaluator final : public FitnessEvaluator {
     std::array<float, kMaxCoefficients> k{};
     const bool finite = centre(model, k.data());
     std::fill(distances.begin(), distances.end(), std::numeric_limits<float>::quiet_NaN());
-    run_in(arena_, worth_sharing(store_.count()), [&] {
+    run_in(crew_, worth_sharing(store_.count()), [&] {
       for_each_task(store_.tiles(), [&](std::size_t tile) {
         alignas(64) std::array<float, kTilePoints> near;
         if (finite) {
@@ -115,7 +112,7 @@ class CpuEvaluator final : public FitnessEvaluator {
       std::vector<char> usable(models.size());
       for (std::size_t m = 0; m < models.size(); ++m) usable[m] = centre(models[m], coefficients[m].data());
       std::fill(labels.begin(), labels.end(), std::uint16_t{0});
-      run_in(arena_, worth_sharing(store_.count()), [&] {
+      run_in(crew_, worth_sharing(store_.count()), [&] {
         for_each_task(store_.tiles(), [&](std::size_t tile) { assign_tile(tile, models, coefficients, usable, tolerance, labels); });
       });
     });
@@ -125,21 +122,21 @@ class CpuEvaluator final : public FitnessEvaluator {
 
   Result<> survey(const PointsView& points, Survey& survey) override {
     if (auto ok = check_points(points); !ok) return ok;
-    return guarded(points.count, [&] { run_in(arena_, worth_sharing(points.count), [&] { passes_.survey(points, survey); }); });
+    return guarded(points.count, [&] { run_in(crew_, worth_sharing(points.count), [&] { passes_.survey(points, survey); }); });
   }
 
   Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                  std::span<Evidence> evidence) override {
     if (auto ok = check_weigh(points, how, models, distances, evidence); !ok) return ok;
     return guarded(points.count,
-                   [&] { run_in(arena_, worth_sharing(points.count), [&] { passes_.weigh(points, how, models, distances, evidence); }); });
+                   [&] { run_in(crew_, worth_sharing(points.count), [&] { passes_.weigh(points, how, models, distances, evidence); }); });
   }
 
   Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
                  std::span<Evidence> evidence) override {
     if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
     return guarded(points.count, [&] {
-      run_in(arena_, worth_sharing(points.count), [&] { passes_.claim(points, tolerance, models, labels, evidence); });
+      run_in(crew_, worth_sharing(points.count), [&] { passes_.claim(points, tolerance, models, labels, evidence); });
     });
   }
 
@@ -185,7 +182,7 @@ class CpuEvaluator final : public FitnessEvaluator {
   }
 
   const CpuKernels& kernels_;
-  tbb::task_arena arena_;
+  Crew crew_;
   Identity identity_;
   PointStore store_;
   std::vector<float> coefficients_;

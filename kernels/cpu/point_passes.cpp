@@ -8,6 +8,8 @@
 #include <limits>
 #include <type_traits>
 
+#include <hwy/cache_control.h>
+
 #include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels::cpu {
@@ -53,6 +55,13 @@ bool choose_pivot(const PointsView& points, std::size_t first, std::size_t count
   return known > 0;
 }
 
+/// Where the next strip's pivot will be looked for: single rows far apart, which would each be waited for.
+void fetch_probes(const PointsView& points, std::size_t first) {
+  for (const std::size_t row : {first, first + kStripPoints / 2, first + kStripPoints - 1}) {
+    if (row < points.count) hwy::Prefetch(static_cast<const char*>(points.data) + row * points.stride);
+  }
+}
+
 /// What a task needs to work on one strip after another.
 struct Bench {
   Strip strip;
@@ -67,6 +76,7 @@ struct Bench {
     first = index * kStripPoints;
     count = std::min(kStripPoints, points.count - first);
     if (!caps.empty()) caps = caps.subspan(first, count);
+    fetch_probes(points, first + kStripPoints);
     return points.scalar == Scalar::float32 ? load_as<float>(kernels, points, limit, caps) : load_as<double>(kernels, points, limit, caps);
   }
 

@@ -10,7 +10,7 @@
 
 namespace swarmfit::kernels::cpu {
 
-/// Works in the caller's task arena, on arguments that are valid (checks.hpp). Strips are taken in runs of fixed length: each is a task and
+/// Works in the caller's crew, on arguments that are valid (checks.hpp). Strips are taken in runs of fixed length: each is a task and
 /// writes its own sums, which are added up in a fixed order.
 class PointPasses {
  public:

@@ -97,29 +97,28 @@ HWY_INLINE void load_columns(const Strip& strip, std::size_t i, Vector* x) {
 template <std::size_t D>
 HWY_INLINE void sum_all_of(const Strip& strip, StripSums& sums) {
   // Columns of points that are not finite are 0 and add nothing.
-  constexpr std::size_t kStrands = 8;
-  double count = 0;
-  std::array<std::array<double, kStrands>, D> first{};
-  std::array<std::array<std::array<double, kStrands>, D>, D> second{};
-  for (std::size_t i = 0; i < strip.count; i += kStrands) {
-    double x[D][kStrands];
-    for (std::size_t c = 0; c < D; ++c) {
-      for (std::size_t s = 0; s < kStrands; ++s) x[c][s] = static_cast<double>(strip.columns[c][i + s]);
-    }
+  using WideTag = hn::ScalableTag<double>;
+  using Wide = hn::Vec<WideTag>;
+  const WideTag d;
+  const hn::Rebind<float, WideTag> narrow;
+  const auto zero = hn::Zero(narrow), one = hn::Set(narrow, 1.0F);
+  Wide count = hn::Zero(d), first[D], second[D][D];
+  for (std::size_t a = 0; a < D; ++a) {
+    first[a] = hn::Zero(d);
+    for (std::size_t b = a; b < D; ++b) second[a][b] = hn::Zero(d);
+  }
+  for (std::size_t i = 0; i < strip.count; i += hn::Lanes(d)) {
+    Wide x[D];
+    for (std::size_t c = 0; c < D; ++c) x[c] = hn::PromoteTo(d, hn::Load(narrow, strip.columns[c].data() + i));
+    const auto usable = hn::Ge(hn::Load(narrow, strip.limit.data() + i), zero);
+    count = hn::Add(count, hn::PromoteTo(d, hn::IfThenElseZero(usable, one)));
     for (std::size_t a = 0; a < D; ++a) {
-      for (std::size_t s = 0; s < kStrands; ++s) first[a][s] += x[a][s];
-      for (std::size_t b = a; b < D; ++b) {
-        for (std::size_t s = 0; s < kStrands; ++s) second[a][b][s] += x[a][s] * x[b][s];
-      }
+      first[a] = hn::Add(first[a], x[a]);
+      for (std::size_t b = a; b < D; ++b) second[a][b] = hn::MulAdd(x[a], x[b], second[a][b]);
     }
   }
-  for (std::size_t i = 0; i < strip.count; ++i) count += strip.limit[i] >= 0 ? 1.0 : 0.0;
-  const auto total = [](const std::array<double, kStrands>& strands) {
-    double sum = 0;
-    for (const double s : strands) sum += s;
-    return sum;
-  };
-  sums.count = sums.weight = count;
+  const auto total = [&](Wide v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
+  sums.count = sums.weight = total(count);
   for (std::size_t a = 0; a < D; ++a) {
     sums.first[a] = total(first[a]);
     for (std::size_t b = a; b < D; ++b) sums.second[a][b] = total(second[a][b]);

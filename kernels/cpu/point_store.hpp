@@ -19,7 +19,7 @@ using Aligned = std::vector<T, tbb::cache_aligned_allocator<T>>;
 
 class PointStore {
  public:
-  /// Runs inside the caller's task arena, as all that follows. The points must be valid (check_points).
+  /// Runs inside the caller's crew, as all that follows. The points must be valid (check_points).
   void assign(const PointsView& points);
   /// One cap a point, in input order; size and values must be valid.
   void set_caps(std::span<const float> caps);

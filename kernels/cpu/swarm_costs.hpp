@@ -20,8 +20,8 @@ struct CentredSwarm {
   std::span<const float> cutoffs;
 };
 
-/// Works in the caller's task arena, where the work is worth_sharing. Tiles are taken in runs and models in groups: each pair is a task and writes its own partial sums,
-/// which are added up in a fixed order.
+/// Works in the caller's crew, where the work is worth_sharing. Tiles are taken in runs and models in groups: each pair is a task and
+/// writes its own partial sums, which are added up in a fixed order.
 class SwarmCosts {
  public:
   SwarmCosts(const CpuKernels& kernels, bool pruning) : kernels_(kernels), pruning_(pruning) {}

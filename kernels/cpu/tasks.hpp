@@ -1,11 +1,13 @@
-// Work in tasks: on the threads of an arena, or here where it is done before another thread would have woken up.
+// Work in tasks: on the threads of a crew, or here where it is done before another thread would have begun.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
+
+#include "kernels/cpu/crew.hpp"
 
 namespace swarmfit::kernels::cpu {
 
@@ -15,26 +17,40 @@ inline constexpr std::size_t kTaskPoints = 2048;
 /// Is a pass over so many points worth sharing between threads?
 constexpr bool worth_sharing(std::size_t points) noexcept { return points > kTaskPoints; }
 /// Are so many residuals?
-constexpr bool worth_sharing(std::size_t points, std::size_t models) noexcept { return points * models > std::size_t{1} << 18; }
+constexpr bool worth_sharing(std::size_t points, std::size_t models) noexcept { return points * models > std::size_t{1} << 17; }
 
-/// body(task) for each task; one alone is done here. More than one run on the threads of the arena that this is called in.
+/// The crew that the calling thread's tasks are shared out to, within run_in.
+inline Crew*& current_crew() noexcept {
+  static thread_local Crew* current = nullptr;
+  return current;
+}
+
+/// body(task) for each task; one alone is done here. More than one run on the threads of the crew that this is called in, or of TBB where
+/// there is none.
 template <class Body>
 void for_each_task(std::size_t tasks, Body&& body) {
   if (tasks == 1) {
     body(std::size_t{0});
+  } else if (Crew* crew = current_crew(); crew != nullptr) {
+    using Callable = std::remove_reference_t<Body>;
+    crew->run(tasks, [](void* context, std::size_t task) { (*static_cast<Callable*>(context))(task); },
+              const_cast<void*>(static_cast<const void*>(std::addressof(body))));
   } else if (tasks > 1) {
     tbb::parallel_for(std::size_t{0}, tasks, body);
   }
 }
 
-/// Work on the arena's threads where it is shared, else on the caller's.
+/// Work whose tasks are shared out to the crew, or else done by the caller.
 template <class Work>
-void run_in(tbb::task_arena& arena, bool shared, Work&& work) {
-  if (shared) {
-    arena.execute(work);
-  } else {
-    work();
-  }
+void run_in(Crew& crew, bool shared, Work&& work) {
+  struct Within {
+    explicit Within(Crew* crew) : before(std::exchange(current_crew(), crew)) {}
+    ~Within() { current_crew() = before; }
+    Crew* before;
+  };
+  if (!shared) return work();
+  const Within within(&crew);
+  work();
 }
 
 }  // namespace swarmfit::kernels::cpu

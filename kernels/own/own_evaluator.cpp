@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include <oneapi/tbb/task_arena.h>
 
 #include "kernels/checks.hpp"
 #include "kernels/cpu/processor.hpp"
@@ -24,7 +23,7 @@ class OwnEvaluator final : public FitnessEvaluator {
   /// `threads`: none is the reference.
   OwnEvaluator(std::shared_ptr<const OwnModel> own, Identity identity, std::optional<int> threads)
       : own_(std::move(own)), identity_(std::move(identity)) {
-    if (threads) arena_.emplace(*threads);
+    if (threads) crew_.emplace(*threads);
   }
 
   const Identity& identity() const noexcept override { return identity_; }
@@ -130,18 +129,18 @@ class OwnEvaluator final : public FitnessEvaluator {
   /// work(sharing) where that is to be done.
   template <class Work>
   void run(std::size_t points, Work&& work) {
-    if (arena_ && cpu::worth_sharing(points)) {
-      arena_->execute([&] { work(Sharing::threads); });
+    if (crew_ && cpu::worth_sharing(points)) {
+      cpu::run_in(*crew_, true, [&] { work(Sharing::threads); });
     } else {
       work(Sharing::serial);
     }
   }
 
-  /// body(task) for each task, one after another or on the arena's threads.
+  /// body(task) for each task, one after another or on the crew's threads.
   template <class Body>
   void each(std::size_t tasks, bool shared, Body&& body) {
-    if (arena_ && shared) {
-      arena_->execute([&] { cpu::for_each_task(tasks, body); });
+    if (crew_ && shared) {
+      cpu::run_in(*crew_, true, [&] { cpu::for_each_task(tasks, body); });
     } else {
       for (std::size_t task = 0; task < tasks; ++task) body(task);
     }
@@ -181,7 +180,7 @@ class OwnEvaluator final : public FitnessEvaluator {
 
   std::shared_ptr<const OwnModel> own_;
   Identity identity_;
-  std::optional<tbb::task_arena> arena_;
+  std::optional<cpu::Crew> crew_;
   Extent extent_;
   int dimension_ = 0;
   std::vector<std::size_t> input_;  // of each stored point, which are the finite ones, its row

@@ -1,0 +1,142 @@
+#include "kernels/cpu/crew.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <exception>
+#include <thread>
+#include <utility>
+
+#include <hwy/base.h>
+#include <oneapi/tbb/task_arena.h>
+
+#if HWY_ARCH_X86
+#include <immintrin.h>
+#endif
+
+namespace swarmfit::kernels::cpu {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// How long a helper without work looks for more: longer than whatever a fit does by itself between two passes over its points.
+constexpr auto kAwake = std::chrono::microseconds(1000);
+/// Looks before a thread that waits lets others have its processor, each time it looks in vain.
+constexpr int kLooks = 2000;
+
+void breathe() {
+#if HWY_ARCH_X86
+  _mm_pause();
+#endif
+}
+
+}  // namespace
+
+/// Written by the caller of `run`, read by helpers. A helper counts itself `inside` before it looks whether there is work; the caller ends
+/// the work and then waits until nobody is inside, so that nobody sees half of the next.
+struct Crew::Shared {
+  Body body = nullptr;
+  void* context = nullptr;
+  std::size_t tasks = 0;
+  std::exception_ptr failure;
+  std::atomic_flag failed;
+
+  alignas(64) std::atomic<std::size_t> next = 0;
+  alignas(64) std::atomic<std::uint64_t> work = 0;  ///< number of the piece of work, odd while there is some
+  alignas(64) std::atomic<int> inside = 0;
+  std::atomic<int> awake = 0;  ///< helpers called and not gone
+  std::atomic<bool> closing = false;
+
+  void take_tasks() {
+    for (std::size_t task = next.fetch_add(1, std::memory_order_relaxed); task < tasks;
+         task = next.fetch_add(1, std::memory_order_relaxed)) {
+      try {
+        body(context, task);
+      } catch (...) {
+        if (!failed.test_and_set()) failure = std::current_exception();
+        next.store(tasks, std::memory_order_relaxed);
+      }
+    }
+  }
+
+  /// Helps with what there is and what comes, and goes when nothing has come for a while.
+  void help() {
+    std::uint64_t done = 0;
+    auto since = Clock::now();
+    for (int looks = 0; !closing.load(std::memory_order_relaxed); ++looks) {
+      const std::uint64_t seen = work.load(std::memory_order_acquire);
+      if (seen % 2 == 1 && seen != done) {
+        inside.fetch_add(1);
+        if (work.load() == seen) take_tasks();
+        inside.fetch_sub(1);
+        done = seen;
+        looks = 0;
+        since = Clock::now();
+        continue;
+      }
+      breathe();
+      if (looks % 64 != 63) continue;
+      if (Clock::now() - since > kAwake) break;
+      if (looks > kLooks) std::this_thread::yield();
+    }
+    awake.fetch_sub(1);
+  }
+};
+
+class Crew::Arena {
+ public:
+  explicit Arena(int threads) : arena_(threads) { arena_.initialize(); }
+  template <class Work>
+  void enqueue(Work&& work) {
+    arena_.enqueue(std::forward<Work>(work));
+  }
+
+ private:
+  tbb::task_arena arena_;
+};
+
+// The arena is made here and not in the first fit, and its threads are called once: what TBB looks up about the machine, and starting
+// them, takes milliseconds.
+Crew::Crew(int threads)
+    : helpers_(threads - 1), shared_(std::make_shared<Shared>()), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
+  if (arena_) call_helpers();
+}
+
+Crew::~Crew() { shared_->closing = true; }
+
+void Crew::call_helpers() {
+  while (shared_->awake.load(std::memory_order_relaxed) < helpers_) {
+    shared_->awake.fetch_add(1);
+    try {
+      arena_->enqueue([shared = shared_] { shared->help(); });
+    } catch (...) {
+      shared_->awake.fetch_sub(1);  // the caller alone does it as well
+      return;
+    }
+  }
+}
+
+void Crew::run(std::size_t tasks, Body body, void* context) {
+  if (tasks == 0) return;
+  if (helpers_ == 0 || tasks == 1) {
+    for (std::size_t task = 0; task < tasks; ++task) body(context, task);
+    return;
+  }
+  Shared& shared = *shared_;
+  shared.body = body;
+  shared.context = context;
+  shared.tasks = tasks;
+  shared.failed.clear();
+  shared.next.store(0, std::memory_order_relaxed);
+  shared.work.fetch_add(1);
+  call_helpers();
+  shared.take_tasks();
+  shared.work.fetch_add(1);
+  for (int looks = 0; shared.inside.load() > 0; ++looks) {
+    breathe();
+    if (looks > kLooks) std::this_thread::yield();
+  }
+  if (shared.failed.test()) std::rethrow_exception(std::exchange(shared.failure, nullptr));
+}
+
+}  // namespace swarmfit::kernels::cpu

@@ -1,0 +1,35 @@
+// Threads that stay awake between the many short pieces of work of a fit.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+namespace swarmfit::kernels::cpu {
+
+/// Tasks on oneTBB's threads, begun within a microsecond. A thread that TBB has sent to sleep takes tens of them to wake, as long as one
+/// step of a swarm takes; so those that helped once look for more for a short while before they go. The caller works along and waits for
+/// nobody who has not begun. One thread at a time may call.
+class Crew {
+ public:
+  /// threads >= 1, the caller's among them.
+  explicit Crew(int threads);
+  ~Crew();
+  Crew(const Crew&) = delete;
+  Crew& operator=(const Crew&) = delete;
+
+  /// body(context, task) for each task, in any order and on any thread. The first exception is thrown here, when all have ended.
+  using Body = void (*)(void* context, std::size_t task);
+  void run(std::size_t tasks, Body body, void* context);
+
+ private:
+  struct Shared;
+  class Arena;
+
+  void call_helpers();
+
+  int helpers_;
+  std::shared_ptr<Shared> shared_;
+  std::unique_ptr<Arena> arena_;
+};
+
+}  // namespace swarmfit::kernels::cpu
