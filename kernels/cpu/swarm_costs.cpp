@@ -17,6 +17,8 @@ constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 /// Share of the residuals computed above which pruning pauses, for twice as long each time up to the longest pause.
 constexpr double kPoorShare = 0.8;
 constexpr int kLongestPause = 32;
+/// What a swarm is shared out in where it is pruned: enough to keep threads busy, large enough for register tiles.
+constexpr std::size_t kModelGroups = 8, kLeastGroup = 8;
 
 struct Runs {
   explicit Runs(const PointStore& store) : points(store.finite()), tiles(store.tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
@@ -27,19 +29,17 @@ struct Runs {
   std::size_t points, tiles, length, count;
 };
 
-std::size_t groups_of(std::size_t models) { return (models + kGroupModels - 1) / kGroupModels; }
-
-/// body(task, run, first model, models) for each run of tiles and group of models.
+/// body(run, first model, models) for each run of tiles and group of models.
 template <class Body>
 void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
-  const std::size_t groups = groups_of(models), tasks = runs.count * groups;
+  const std::size_t groups = (models + kGroupModels - 1) / kGroupModels, tasks = runs.count * groups;
   // Alike in size, and whole register tiles but for the last group.
   constexpr std::size_t kMultiple = 8;
   static_assert(kGroupModels % kMultiple == 0);
   const std::size_t even = groups > 0 ? (models + groups - 1) / groups : 0, size = (even + kMultiple - 1) / kMultiple * kMultiple;
   const auto one = [&](std::size_t task) {
     const std::size_t first = task % groups * size;
-    body(task, task / groups, first, std::min(size, models - first));
+    body(task / groups, first, std::min(size, models - first));
   };
   if (worth_sharing(runs.points, models)) {
     for_each_task(tasks, one);
@@ -80,7 +80,7 @@ std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSw
                                        std::span<float> costs) {
   const Runs runs(points);
   partial_.assign(runs.count * swarm.count, {});
-  for_tasks(runs, swarm.count, [&](std::size_t, std::size_t run, std::size_t first, std::size_t models) {
+  for_tasks(runs, swarm.count, [&](std::size_t run, std::size_t first, std::size_t models) {
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
       kernels_.add_costs(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
                          partial_.data() + run * swarm.count + first);
@@ -100,91 +100,89 @@ std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSw
 
 std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
   points.prepare_bounds(kernels_, summing);
-  bound_all(points, swarm, summing.loss);
-  alive_.resize(swarm.count);
+  // Each model's blocks are looked at, and what must be touched of them is, by one thread from first to last.
+  const std::size_t size = std::clamp((swarm.count + kModelGroups - 1) / kModelGroups, kLeastGroup, kGroupModels);
+  const std::size_t groups = (swarm.count + size - 1) / size;
+  if (groups_.size() < groups) groups_.resize(groups);
+  const auto one = [&](std::size_t g) {
+    const std::size_t first = g * size;
+    groups_[g].evaluate(kernels_, points, swarm, summing, first, std::min(size, swarm.count - first), costs);
+  };
+  if (worth_sharing(points.finite(), swarm.count)) {
+    for_each_task(groups, one);
+  } else {
+    for (std::size_t g = 0; g < groups; ++g) one(g);
+  }
+  std::uint64_t touched = 0;
+  for (std::size_t g = 0; g < groups; ++g) touched += groups_[g].touched();
+  return std::min<std::uint64_t>(touched, points.finite() * swarm.count);  // padding was counted as well
+}
+
+void OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                         std::size_t first, std::size_t models, std::span<float> costs) {
+  bound(kernels, points, swarm, summing.loss, first, models);
+  alive_.resize(models);
   std::iota(alive_.begin(), alive_.end(), 0U);
   std::erase_if(alive_, [&](std::uint32_t j) {
-    if (swarm.finite[j]) return false;
-    costs[j] = std::numeric_limits<float>::infinity();
+    if (swarm.finite[first + j]) return false;
+    costs[first + j] = std::numeric_limits<float>::infinity();
     return true;
   });
   const auto drop_lost = [&] {
     std::erase_if(alive_, [&](std::uint32_t j) {
-      const float least = below(static_cast<double>(units_[j]) / static_cast<double>(summing.scale) + bound_mixed_[j] + bound_within_[j]);
-      if (swarm.cutoffs.empty() || !(least >= swarm.cutoffs[j])) return false;
-      costs[j] = least;
+      const PartialBound& known = bounds_[j];
+      const float least = below(static_cast<double>(known.settled) / static_cast<double>(summing.scale) + known.mixed + known.within);
+      if (swarm.cutoffs.empty() || !(least >= swarm.cutoffs[first + j])) return false;
+      costs[first + j] = least;
       return true;
     });
   };
+  touched_ = 0;
   // Blocks that straddle their caps are bounded loosest: they come first.
   drop_lost();
-  std::uint64_t touched = add_open(points, swarm, summing, &Open::mixed);
-  for (const std::uint32_t j : alive_) bound_mixed_[j] = 0;
+  add(kernels, points, swarm, summing, first, models, &Open::mixed);
+  for (const std::uint32_t j : alive_) bounds_[j].mixed = 0;
   drop_lost();
-  touched += add_open(points, swarm, summing, &Open::within);
+  add(kernels, points, swarm, summing, first, models, &Open::within);
   for (const std::uint32_t j : alive_) {
-    costs[j] = static_cast<float>(static_cast<double>(units_[j]) / static_cast<double>(summing.scale));
-  }
-  return std::min<std::uint64_t>(touched, points.finite() * swarm.count);  // padding was counted as well
-}
-
-void SwarmCosts::bound_all(const PointStore& points, const CentredSwarm& swarm, Loss loss) {
-  const std::size_t width = width_of(swarm.kind);
-  slack_.resize(swarm.count);
-  for (std::size_t j = 0; j < swarm.count; ++j) {
-    slack_[j] = residual_rounding(swarm.kind, swarm.coefficients.data() + j * width, points.reach().data());
-  }
-  const Runs runs(points);
-  bounds_.assign(runs.count * swarm.count, {});
-  open_.resize(points.tiles() * swarm.count);
-  for_tasks(runs, swarm.count, [&](std::size_t, std::size_t run, std::size_t first, std::size_t models) {
-    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.bound(swarm.kind, loss, points.bounds(tile), swarm.coefficients.data() + first * width, slack_.data() + first, models,
-                     open_.data() + tile * swarm.count + first, bounds_.data() + run * swarm.count + first);
-    }
-  });
-  units_.assign(swarm.count, 0);
-  bound_within_.assign(swarm.count, 0.0);
-  bound_mixed_.assign(swarm.count, 0.0);
-  for (std::size_t run = 0; run < runs.count; ++run) {
-    for (std::size_t j = 0; j < swarm.count; ++j) {
-      const PartialBound& bound = bounds_[run * swarm.count + j];
-      units_[j] += bound.settled;
-      bound_within_[j] += bound.within;
-      bound_mixed_[j] += bound.mixed;
-    }
+    costs[first + j] = static_cast<float>(static_cast<double>(bounds_[j].settled) / static_cast<double>(summing.scale));
   }
 }
 
-std::uint64_t SwarmCosts::add_open(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                                   std::uint8_t Open::*blocks) {
-  if (alive_.empty()) return 0;
+void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss, std::size_t first,
+                      std::size_t models) {
   const std::size_t width = width_of(swarm.kind);
-  const Runs runs(points);
-  alive_coefficients_.resize(alive_.size() * width);
+  const float* coefficients = swarm.coefficients.data() + first * width;
+  slack_.resize(models);
+  for (std::size_t j = 0; j < models; ++j) slack_[j] = residual_rounding(swarm.kind, coefficients + j * width, points.reach().data());
+  bounds_.assign(models, {});
+  open_.resize(points.tiles() * models);
+  for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
+    kernels.bound(swarm.kind, loss, points.bounds(tile), coefficients, slack_.data(), models, open_.data() + tile * models, bounds_.data());
+  }
+}
+
+void OpenGroup::add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                    std::size_t first, std::size_t models, std::uint8_t Open::*blocks) {
+  if (alive_.empty()) return;
+  const std::size_t width = width_of(swarm.kind);
+  coefficients_.resize(alive_.size() * width);
   for (std::size_t a = 0; a < alive_.size(); ++a) {
-    std::copy_n(swarm.coefficients.data() + alive_[a] * width, width, alive_coefficients_.data() + a * width);
+    std::copy_n(swarm.coefficients.data() + (first + alive_[a]) * width, width, coefficients_.data() + a * width);
   }
-  partial_.assign(runs.count * alive_.size(), {});
-  touched_.assign(runs.count * groups_of(alive_.size()), 0);
-  for_tasks(runs, alive_.size(), [&](std::size_t task, std::size_t run, std::size_t first, std::size_t models) {
-    std::array<std::uint8_t, kGroupModels> bits{};
-    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      unsigned any = 0;
-      for (std::size_t m = 0; m < models; ++m) {
-        bits[m] = open_[tile * swarm.count + alive_[first + m]].*blocks;
-        any |= bits[m];
-        touched_[task] += static_cast<std::uint64_t>(std::popcount(bits[m])) * kBlockPoints;
-      }
-      if (any == 0) continue;
-      kernels_.add_open_costs(swarm.kind, summing, points.tile(tile), alive_coefficients_.data() + first * width, models, bits.data(),
-                              partial_.data() + run * alive_.size() + first);
+  sums_.assign(alive_.size(), {});
+  std::array<std::uint8_t, kGroupModels> bits{};
+  for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
+    unsigned any = 0;
+    for (std::size_t a = 0; a < alive_.size(); ++a) {
+      bits[a] = open_[tile * models + alive_[a]].*blocks;
+      any |= bits[a];
+      touched_ += static_cast<std::uint64_t>(std::popcount(bits[a])) * kBlockPoints;
     }
-  });
-  for (std::size_t run = 0; run < runs.count; ++run) {
-    for (std::size_t a = 0; a < alive_.size(); ++a) units_[alive_[a]] += partial_[run * alive_.size() + a].units;
+    if (any == 0) continue;
+    kernels.add_open_costs(swarm.kind, summing, points.tile(tile), coefficients_.data(), alive_.size(), bits.data(), sums_.data());
   }
-  return std::accumulate(touched_.begin(), touched_.end(), std::uint64_t{0});
+  for (std::size_t a = 0; a < alive_.size(); ++a) bounds_[alive_[a]].settled += sums_[a].units;
 }
 
 }  // namespace swarmfit::kernels::cpu

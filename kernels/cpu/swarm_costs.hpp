@@ -20,8 +20,33 @@ struct CentredSwarm {
   std::span<const float> cutoffs;
 };
 
-/// Works in the caller's crew, where the work is worth_sharing. Tiles are taken in runs and models in groups: each pair is a task and
-/// writes its own partial sums, which are added up in a fixed order.
+/// A few models of a swarm over all points, whose blocks are looked at before any point is touched. Keeps its memory from call to call.
+class OpenGroup {
+ public:
+  /// Fills the costs of `models` models from `first` on. The points' bounds are prepared, the form is exact.
+  void evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::size_t first,
+                std::size_t models, std::span<float> costs);
+  /// How many residuals that computed.
+  std::uint64_t touched() const noexcept { return touched_; }
+
+ private:
+  void bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss, std::size_t first,
+             std::size_t models);
+  /// What blocks of one sort cost the models that are alive.
+  void add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::size_t first,
+           std::size_t models, std::uint8_t Open::*blocks);
+
+  std::vector<Open> open_;  ///< a tile and a model
+  std::vector<float> slack_;
+  std::vector<PartialBound> bounds_;  ///< a model: what is settled, and bounds of the rest
+  std::vector<std::uint32_t> alive_;  ///< models whose cost may still be below the cutoff
+  std::vector<float> coefficients_;   ///< of those alive
+  std::vector<PartialCost> sums_;     ///< of those alive
+  std::uint64_t touched_ = 0;
+};
+
+/// Works in the caller's crew, where the work is worth_sharing. By brute force tiles are taken in runs and models in groups: each pair
+/// is a task and writes its own partial sums, which are added up in a fixed order. With pruning a group of models is a task.
 class SwarmCosts {
  public:
   SwarmCosts(const CpuKernels& kernels, bool pruning) : kernels_(kernels), pruning_(pruning) {}
@@ -35,8 +60,6 @@ class SwarmCosts {
   bool prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing);
   std::uint64_t evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
   std::uint64_t evaluate_open(PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
-  void bound_all(const PointStore& points, const CentredSwarm& swarm, Loss loss);
-  std::uint64_t add_open(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::uint8_t Open::*blocks);
 
   const CpuKernels& kernels_;
   bool pruning_;
@@ -44,14 +67,7 @@ class SwarmCosts {
   int last_pause_ = 0;
 
   std::vector<PartialCost> partial_;  ///< a run of tiles and a model
-  std::vector<PartialBound> bounds_;  ///< a run of tiles and a model
-  std::vector<Open> open_;            ///< a tile and a model
-  std::vector<float> slack_;
-  std::vector<std::uint32_t> alive_;  ///< models whose cost may still be below the cutoff
-  std::vector<float> alive_coefficients_;
-  std::vector<double> bound_within_, bound_mixed_;  ///< a model
-  std::vector<std::int64_t> units_;                 ///< a model: quanta known exactly
-  std::vector<std::uint64_t> touched_;              ///< a task
+  std::vector<OpenGroup> groups_;
 };
 
 }  // namespace swarmfit::kernels::cpu
