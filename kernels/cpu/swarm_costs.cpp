@@ -18,7 +18,7 @@ constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 constexpr double kPoorShare = 0.8;
 constexpr int kLongestPause = 32;
 /// What a swarm is shared out in where it is pruned: enough to keep threads busy, large enough for register tiles.
-constexpr std::size_t kModelGroups = 8, kLeastGroup = 8;
+constexpr std::size_t kModelGroups = 6, kLeastGroup = 8;
 
 struct Runs {
   explicit Runs(const PointStore& store) : points(store.finite()), tiles(store.tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
@@ -103,23 +103,24 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
   // Each model's blocks are looked at, and what must be touched of them is, by one thread from first to last.
   const std::size_t size = std::clamp((swarm.count + kModelGroups - 1) / kModelGroups, kLeastGroup, kGroupModels);
   const std::size_t groups = (swarm.count + size - 1) / size;
-  if (groups_.size() < groups) groups_.resize(groups);
+  touched_.assign(groups, 0);
   const auto one = [&](std::size_t g) {
+    // A thread's own from call to call: what another core wrote last is slow to get at.
+    thread_local OpenGroup group;
     const std::size_t first = g * size;
-    groups_[g].evaluate(kernels_, points, swarm, summing, first, std::min(size, swarm.count - first), costs);
+    touched_[g] = group.evaluate(kernels_, points, swarm, summing, first, std::min(size, swarm.count - first), costs);
   };
   if (worth_sharing(points.finite(), swarm.count)) {
     for_each_task(groups, one);
   } else {
     for (std::size_t g = 0; g < groups; ++g) one(g);
   }
-  std::uint64_t touched = 0;
-  for (std::size_t g = 0; g < groups; ++g) touched += groups_[g].touched();
+  const std::uint64_t touched = std::accumulate(touched_.begin(), touched_.end(), std::uint64_t{0});
   return std::min<std::uint64_t>(touched, points.finite() * swarm.count);  // padding was counted as well
 }
 
-void OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                         std::size_t first, std::size_t models, std::span<float> costs) {
+std::uint64_t OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                                  std::size_t first, std::size_t models, std::span<float> costs) {
   bound(kernels, points, swarm, summing.loss, first, models);
   alive_.resize(models);
   std::iota(alive_.begin(), alive_.end(), 0U);
@@ -147,6 +148,7 @@ void OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& points, co
   for (const std::uint32_t j : alive_) {
     costs[first + j] = static_cast<float>(static_cast<double>(bounds_[j].settled) / static_cast<double>(summing.scale));
   }
+  return touched_;
 }
 
 void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss, std::size_t first,

@@ -23,11 +23,10 @@ struct CentredSwarm {
 /// A few models of a swarm over all points, whose blocks are looked at before any point is touched. Keeps its memory from call to call.
 class OpenGroup {
  public:
-  /// Fills the costs of `models` models from `first` on. The points' bounds are prepared, the form is exact.
-  void evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::size_t first,
-                std::size_t models, std::span<float> costs);
-  /// How many residuals that computed.
-  std::uint64_t touched() const noexcept { return touched_; }
+  /// Fills the costs of `models` models from `first` on; returns how many residuals were computed. The points' bounds are prepared, the
+  /// form is exact.
+  std::uint64_t evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                         std::size_t first, std::size_t models, std::span<float> costs);
 
  private:
   void bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss, std::size_t first,
@@ -67,7 +66,7 @@ class SwarmCosts {
   int last_pause_ = 0;
 
   std::vector<PartialCost> partial_;  ///< a run of tiles and a model
-  std::vector<OpenGroup> groups_;
+  std::vector<std::uint64_t> touched_;  ///< a group of models
 };
 
 }  // namespace swarmfit::kernels::cpu
