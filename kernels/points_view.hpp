@@ -16,6 +16,7 @@ struct PointsView {
   int dimension = 0;       ///< columns: 2 (x, y), 3 (x, y, z) or 4 (x1, y1, x2, y2)
   std::size_t count = 0;   ///< rows
   std::size_t stride = 0;  ///< bytes from a row to the next
+  bool ordered = false;    ///< neighbours in the list are neighbours in space, as in Morton order: nobody needs to sort them
 
   double at(std::size_t row, int column) const noexcept {
     const char* p = static_cast<const char*>(data) + row * stride;

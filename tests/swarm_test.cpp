@@ -113,9 +113,24 @@ TEST(WorkingPoints, CountsOnlyFinitePoints) {
   const std::vector<float> rows{0, 0, 0, nan, 0, 0, 1, 0, 0, 0, INFINITY, 0, 0, 1, 0};
   const models::WorkingPoints points(PointsView(std::span<const float>(rows), 3));
   EXPECT_EQ(points.finite_count(), 3U);
-  const std::size_t places[] = {0, 1, 2};
-  EXPECT_EQ(points.finite_at(places), (std::vector<std::uint32_t>{0, 2, 4}));
+  models::FiniteWalk walk = points.walk();
+  EXPECT_EQ((std::vector<std::uint32_t>{walk.to(0), walk.to(1), walk.to(2)}), (std::vector<std::uint32_t>{0, 2, 4}));
   EXPECT_FALSE(points.finite(3));
+}
+
+TEST(WorkingPoints, WalksOverFullAndEmptyWords) {
+  std::vector<float> rows(3 * 400, 1.0F);
+  std::vector<std::uint32_t> finite;
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    const bool gone = (i >= 70 && i < 200) || (i > 320 && i % 3 == 0);
+    rows[3 * i] = gone ? std::nanf("") : static_cast<float>(i);
+    if (!gone) finite.push_back(i);
+  }
+  const models::WorkingPoints points(PointsView(std::span<const float>(rows), 3));
+  ASSERT_EQ(points.finite_count(), finite.size());
+  models::FiniteWalk every = points.walk(), some = points.walk();
+  for (std::size_t place = 0; place < finite.size(); ++place) EXPECT_EQ(every.to(place), finite[place]);
+  for (std::size_t place = 3; place < finite.size(); place += 37) EXPECT_EQ(some.to(place), finite[place]);
 }
 
 /// Fitness is the squared distance of the normal and the offset from a hidden plane: one optimum, known.

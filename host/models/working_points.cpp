@@ -44,6 +44,11 @@ WorkingPoints::WorkingPoints(const PointsView& points, kernels::Survey survey) :
 
 namespace {
 
+constexpr std::size_t kWord = 64;
+
+/// Most words of a dense cloud are full.
+std::size_t ones(std::uint64_t bits) { return bits == ~std::uint64_t{0} ? kWord : static_cast<std::size_t>(std::popcount(bits)); }
+
 /// Which bit of a word is the one after `before` others, of at least that many.
 std::size_t bit_after(std::uint64_t bits, std::size_t before) {
   for (; before > 0; --before) bits &= bits - 1;
@@ -52,22 +57,15 @@ std::size_t bit_after(std::uint64_t bits, std::size_t before) {
 
 }  // namespace
 
-std::vector<std::uint32_t> WorkingPoints::finite_at(std::span<const std::size_t> places) const {
-  constexpr std::size_t kWord = 64;
-  std::vector<std::uint32_t> found(places.size());
-  std::size_t word = 0, before = 0;  // finite points in the words before
-  std::size_t here = survey_.finite.empty() ? 0 : static_cast<std::size_t>(std::popcount(survey_.finite[0]));
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    while (before + here <= places[k]) {
-      before += here;
-      const std::uint64_t bits = survey_.finite[++word];
-      // Most words of a dense cloud are full.
-      here = bits == ~std::uint64_t{0} ? kWord : static_cast<std::size_t>(std::popcount(bits));
-    }
-    const std::size_t rank = places[k] - before;
-    found[k] = static_cast<std::uint32_t>(word * kWord + (here == kWord ? rank : bit_after(survey_.finite[word], rank)));
+std::uint32_t FiniteWalk::to(std::size_t place) {
+  while (before_ + here_ <= place) {
+    before_ += here_;
+    here_ = ones(finite_[++word_]);
   }
-  return found;
+  const std::size_t rank = place - before_;
+  return static_cast<std::uint32_t>(word_ * kWord + (here_ == kWord ? rank : bit_after(finite_[word_], rank)));
 }
+
+FiniteWalk WorkingPoints::walk() const { return FiniteWalk(survey_.finite, survey_.finite.empty() ? 0 : ones(survey_.finite[0])); }
 
 }  // namespace swarmfit::models

@@ -27,6 +27,20 @@ struct Frame {
 
 kernels::PointsView to_kernel(const PointsView& points) noexcept;
 
+/// Tells where finite points are in the input, in ascending order.
+class FiniteWalk {
+ public:
+  /// Input index of the finite point at a place in [0, finite_count) among them, not below the place asked for before.
+  std::uint32_t to(std::size_t place);
+
+ private:
+  friend class WorkingPoints;
+  FiniteWalk(std::span<const std::uint64_t> finite, std::size_t here) : finite_(finite), here_(here) {}
+
+  std::span<const std::uint64_t> finite_;
+  std::size_t word_ = 0, before_ = 0, here_;  ///< finite points in the words before this one, and in it
+};
+
 /// A cloud with its frame. Owns no coordinates.
 class WorkingPoints {
  public:
@@ -40,8 +54,8 @@ class WorkingPoints {
   std::size_t size() const noexcept { return view_.count; }
   std::size_t finite_count() const noexcept { return survey_.finite_count; }
   bool finite(std::size_t i) const noexcept { return ((survey_.finite[i / 64] >> (i % 64)) & 1U) != 0; }
-  /// Input indices of the finite points at these places, each in [0, finite_count), among them; places in ascending order.
-  std::vector<std::uint32_t> finite_at(std::span<const std::size_t> places) const;
+  /// From finite point to finite point, the first of them at place 0.
+  FiniteWalk walk() const;
   const Frame& frame() const noexcept { return frame_; }
   /// Dimension of the smallest flat that holds all finite points (to float precision): 0 a point, 1 a line, 2 a plane ...
   int rank() const noexcept { return rank_; }

@@ -68,26 +68,22 @@ std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, 
 }  // namespace
 
 std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size) {
-  const std::size_t n = points.finite_count();
-  std::vector<std::size_t> places(std::min(n, size));
-  const std::size_t runs = places.size();
-  if (runs == n) {
-    std::iota(places.begin(), places.end(), std::size_t{0});
-    return points.finite_at(places);
-  }
+  const std::size_t n = points.finite_count(), runs = std::min(n, size);
+  std::vector<std::uint32_t> drawn(runs);
+  models::FiniteWalk walk = points.walk();
   // Run k begins at floor(n k / runs).
-  const std::size_t whole = n / runs, rest = n % runs;
+  const std::size_t whole = runs > 0 ? n / runs : 0, rest = runs > 0 ? n % runs : 0;
   std::array<std::uint32_t, 4> words{};
   std::size_t from = 0, over = 0;
   for (std::size_t k = 0; k < runs; ++k) {
-    if (k % 4 == 0) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / 4));
+    if (k % 4 == 0 && runs < n) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / 4));
     over += rest;
     const std::size_t length = whole + (over >= runs ? 1 : 0);
     if (over >= runs) over -= runs;
-    places[k] = from + Random::below(words[k % 4], length);
+    drawn[k] = walk.to(from + Random::below(words[k % 4], length));
     from += length;
   }
-  return points.finite_at(places);
+  return drawn;
 }
 
 Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index)

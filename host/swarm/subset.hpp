@@ -42,7 +42,11 @@ class Subset {
   /// Input indices, in Morton order.
   std::span<const std::uint32_t> index() const noexcept { return index_; }
   /// The coordinates of these points; a view of memory that lives as long as this.
-  kernels::PointsView view() const noexcept { return models::to_kernel(rows_.view()); }
+  kernels::PointsView view() const noexcept {
+    kernels::PointsView view = models::to_kernel(rows_.view());
+    view.ordered = true;
+    return view;
+  }
   /// values[k] = all[index[k]].
   void gather(std::span<const float> all, std::vector<float>& values) const;
 

@@ -66,7 +66,7 @@ void PointStore::assign(const PointsView& points) {
     for (std::size_t c = 0; c < kMaxDimension; ++c) centre_[c] += chunk.sum[c] / static_cast<double>(finite_ > 0 ? finite_ : 1);
   }
   keep_finite(points, chunks);
-  if (dimension_ <= 3 && blocks_ > 1) sort();
+  if (dimension_ <= 3 && blocks_ > 1 && !points.ordered) sort();
 }
 
 void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunks) {
