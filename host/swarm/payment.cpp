@@ -13,54 +13,30 @@ double saved(std::span<const float> caps, std::span<const float> distances) {
   return sum;
 }
 
-namespace {
-
-/// Points that are counted at a time, in plain loops that compilers turn into vectors.
-constexpr std::size_t kStrip = 256;
-constexpr std::size_t kStrands = 8;
-constexpr auto kFarther = static_cast<float>(Support::kSlabs);  // the slab of all that is farther
-constexpr float kExplained = kFarther + 1;                      // and of what takes no part
-
-int count_below(const std::array<float, kStrip>& values, float edge) {
-  int count = 0;
-  for (const float value : values) count += value < edge ? 1 : 0;
-  return count;
-}
-
-}  // namespace
-
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found) {
+  // The last place is for all that is farther, or NaN; one more for what is explained already.
+  constexpr auto kFarther = static_cast<float>(Support::kSlabs);
+  std::array<std::size_t, Support::kSlabs + 2> counts{};
   const float half = 0.5F * tau, least = kUnexplained * tau, reach = kFarther * tau, per_tau = 1 / tau;
-  std::array<std::size_t, Support::kSlabs> below{};  // of the first slab, of the first two, and so on
-  std::array<double, kStrands> square{};
-  Support s;
-  for (std::size_t first = 0; first < distances.size(); first += kStrip) {
-    const std::size_t count = std::min(kStrip, distances.size() - first);
-    const float *distance = distances.data() + first, *cap = caps.data() + first;
-    std::array<float, kStrip> slab, own;
-    slab.fill(kExplained);
-    own.fill(0);
-    for (std::size_t i = 0; i < count; ++i) {
-      // Comparisons that a NaN fails.
-      const float scaled = distance[i] * per_tau, near = scaled < kFarther ? scaled : kFarther;
-      slab[i] = (cap[i] >= least) & (distance[i] >= 0) ? near : kExplained;
-    }
-    for (std::size_t i = 0; i < count; ++i) own[i] = slab[i] < 1 ? distance[i] : 0.0F;
-    for (std::size_t k = 0; k < below.size(); ++k) below[k] += static_cast<std::size_t>(count_below(slab, static_cast<float>(k + 1)));
-    s.unexplained += static_cast<std::size_t>(count_below(slab, kExplained));
-    for (std::size_t i = 0; i < kStrip; i += kStrands) {
-      for (std::size_t strand = 0; strand < kStrands; ++strand) {
-        square[strand] += static_cast<double>(own[i + strand]) * static_cast<double>(own[i + strand]);
-      }
-    }
-    int inner = 0, beside = 0;
-    for (std::size_t i = 0; i < count; ++i) inner += (slab[i] < 1) & (distance[i] < half) ? 1 : 0;
-    for (std::size_t i = 0; i < count && !found.empty(); ++i) beside += (slab[i] < 1) & (found[first + i] < reach) ? 1 : 0;
-    s.inner += static_cast<std::size_t>(inner);
-    s.beside += static_cast<std::size_t>(beside);
+  double square = 0;
+  std::size_t inner = 0, beside = 0;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const float d = distances[i];
+    const bool unexplained = caps[i] >= least && !std::isnan(d);
+    const float slab = d < reach ? d * per_tau : kFarther;
+    const std::size_t place = unexplained ? static_cast<std::size_t>(std::min(slab, kFarther)) : Support::kSlabs + 1;
+    ++counts[place];
+    if (place != 0) continue;
+    square += static_cast<double>(d) * static_cast<double>(d);
+    inner += d < half ? 1 : 0;
+    beside += !found.empty() && found[i] < reach ? 1 : 0;
   }
-  s.square = std::accumulate(square.begin(), square.end(), 0.0);
-  std::adjacent_difference(below.begin(), below.end(), s.slabs.begin());
+  Support s;
+  s.square = square;
+  s.inner = inner;
+  s.beside = beside;
+  s.unexplained = distances.size() - counts[Support::kSlabs + 1];
+  std::copy_n(counts.begin(), Support::kSlabs, s.slabs.begin());
   return s;
 }
 
