@@ -123,7 +123,11 @@ Expected<> Perceiver::State::suit_sensor(const Cloud& frame) {
 Expected<> Perceiver::State::find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                                            PerceiveResult& result) {
   if (vertical) return {};
-  auto planes = perception::find_any_planes(*fitter, overview, stop);
+  // Stereo's planes bend, and are told best by all that there are.
+  const auto suffice = [&](std::span<const Model> planes, std::size_t left) {
+    return !stereo && perception::is_vertical_decided(grid, planes, left, options.horizontal_angle);
+  };
+  auto planes = perception::find_any_planes(*fitter, overview, suffice, stop);
   if (!planes) return tl::unexpected(planes.error());
   vertical = perception::vertical_from_planes(grid, planes->models, options.horizontal_angle);
   if (vertical) return fitter->set_options(fit_options());

@@ -11,6 +11,7 @@
 namespace swarmfit::perception {
 namespace {
 
+constexpr double kThreshold = 0.01;               // [m] of planes, unless one is given
 constexpr double kNormalSlack = 0.35;             // [rad] normals of cells are noisy
 constexpr float kAlong = 0.9f;                    // cosine: a cell whose normal is farther off does not lie in the plane
 constexpr double kAgreement = 0.5;                // share of a plane's cells that lie along it; less is clutter cut by a slab
@@ -62,13 +63,22 @@ Membership count_members(const Overview& overview, const std::vector<std::uint32
   return count;
 }
 
+bool is_clutter(const Membership& count) { return static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within); }
+
+/// Of a plane; none where it is a slab through clutter.
+std::size_t cells_of(const Membership& count) { return is_clutter(count) ? 0 : count.along; }
+
+bool lies_in(const Overview& overview, std::uint32_t cell, const LocalPlane& plane, float tau) {
+  return std::abs(plane.height(overview.cells.points[cell])) <= tau && overview.agrees(cell, plane.normal, kAlong);
+}
+
 /// A fit with no model in it, for a frame in which there is nothing to fit to.
 FitResult nothing(const Fitter& fitter, std::size_t points) {
   FitResult fit;
   fit.labels.assign(points, 0);
   fit.backend = fitter.backend();
   fit.seed = fitter.options().seed;
-  fit.threshold = fitter.options().threshold.value_or(0.01);
+  fit.threshold = fitter.options().threshold.value_or(kThreshold);
   fit.stop_reason = "nothing flat to look at";
   return fit;
 }
@@ -253,16 +263,24 @@ void erase_models(FitResult& fit, std::vector<Surface>& surfaces, std::size_t le
 
 }  // namespace
 
-Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const std::stop_token& stop) {
+Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const PlanesSuffice& suffice, const std::stop_token& stop) {
   const auto flat = flat_cells(overview);
   if (overview.has_normals() && flat.size() < kFewCells) return nothing(fitter, overview.cells.size());
   const auto values = gather(overview, flat, kCellsForDirection);
-  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), {}, stop);
+  const auto tau = static_cast<float>(fitter.options().threshold.value_or(kThreshold));
+  std::vector<Model> counted;
+  auto left = flat;
+  const auto on_model = [&](const Model& model) {
+    const auto plane = to_local(model);
+    counted.push_back(model);
+    counted.back().inliers = cells_of(count_members(overview, flat, plane, tau));
+    std::erase_if(left, [&](std::uint32_t i) { return lies_in(overview, i, plane, tau); });
+    return suffice(counted, left.size()) ? Verdict::stop : Verdict::go_on;
+  };
+  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), on_model, stop);
   if (!fitted) return tl::unexpected(fitted.error());
-  for (auto& model : fitted->models) {
-    const auto count = count_members(overview, flat, to_local(model), static_cast<float>(fitted->threshold));
-    model.inliers = static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within) ? 0 : count.along;
-  }
+  for (auto& model : fitted->models)
+    model.inliers = cells_of(count_members(overview, flat, to_local(model), static_cast<float>(fitted->threshold)));
   std::erase_if(fitted->models, [](const Model& model) { return model.inliers == 0; });
   return fitted;
 }
@@ -283,14 +301,13 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
                        static_cast<double>(std::max<std::size_t>(1, values.size() / 3));
   // A plane's border has no normals; so cells are given the benefit of the doubt here, and points are counted in the end.
   const double reasonable = 0.5 * options.min_plane_share * static_cast<double>(grid.finite) / block;
-  const double tau = fitter.options().threshold.value_or(0.01);
+  const double tau = fitter.options().threshold.value_or(kThreshold);
   std::vector<bool> clutter;
   bool too_small = false;
   const auto on_model = [&](const Model& model) {
     too_small = static_cast<double>(model.inliers) < reasonable;
     if (too_small) return Verdict::stop;
-    const auto count = count_members(overview, flat, to_local(model), static_cast<float>(tau));
-    clutter.push_back(static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within));
+    clutter.push_back(is_clutter(count_members(overview, flat, to_local(model), static_cast<float>(tau))));
     if (clutter.back() || !on_plane) return Verdict::go_on;
     Model told = model;
     to_data_frame(told, grid.origin, up);

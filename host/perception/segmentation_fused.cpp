@@ -66,7 +66,7 @@ class FusedCut {
     order.push_back(kUncertain);
     order.push_back(kBackground);
     std::vector<Label> cut(active_.size(), kBackground);
-    energy_.minimise(order, 1, cut, options_.fit.threads);  // more move next to nothing
+    energy_.minimise(order, 1, cut, options_.fit.threads);
     for (std::size_t n = 0; n < active_.size(); ++n) labels_[active_[n]] = cut[n];
     return std::move(labels_);
   }
