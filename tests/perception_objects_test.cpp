@@ -65,10 +65,10 @@ TEST(Objects, TheFloorOfAVesselJoinsIt) {
                                {{0.15, 0.05, 0.05}, {0.005, 0.155, 0.05}}});
   ObjectLabels one{std::vector<std::uint16_t>(scene.grid.size(), 0), {0}};
   for (std::size_t i = 0; i < scene.grid.size(); ++i) one.of_point[i] = scene.rendering.truth[i] >= 2;
-  std::vector<std::uint8_t> on_support(scene.grid.size(), 0);
+  std::vector<std::uint16_t> on_support(scene.grid.size(), 0);
   for (std::size_t i = 0; i < on_support.size(); ++i) on_support[i] = scene.rendering.truth[i] == 1;
   const auto before = one.of_point;
-  fill_basins(scene.grid, on_support, one);
+  fill_basins(scene.grid, on_support, std::vector<std::uint8_t>{0, 1}, 0, one);
   std::size_t joined = 0, inside = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (before[i] != 0 || on_support[i] == 0) continue;
