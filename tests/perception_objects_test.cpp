@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "host/perception/objects.hpp"
+#include "host/perception/runs.hpp"
 #include "tests/perception_fixture.hpp"
 
 namespace swarmfit::perception {
@@ -107,6 +108,23 @@ TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {
   EXPECT_LT(spaces[0].radius, 1.2 * 1.25 * std::sqrt(0.01 + 0.0025 + 0.01));
   EXPECT_TRUE(make_spaces(scene.grid, models, 1000000, 1.2, 0, labels).empty());
   EXPECT_EQ(std::count(labels.of_point.begin(), labels.of_point.end(), 0), static_cast<std::ptrdiff_t>(labels.of_point.size()));
+}
+
+TEST(Runs, AreTheStretchesOfEachLabelWhereverTheyBegin) {
+  const std::vector<std::uint16_t> labels{1, 0, 0, 2, 2, 3, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 0, 0, 5};
+  for (std::size_t begin = 0; begin <= labels.size(); ++begin)
+    for (std::size_t end = begin; end <= labels.size(); ++end) {
+      std::vector<std::uint16_t> seen(labels.size(), 0), expected(labels.size(), 0);
+      std::copy(labels.begin() + static_cast<std::ptrdiff_t>(begin), labels.begin() + static_cast<std::ptrdiff_t>(end),
+                expected.begin() + static_cast<std::ptrdiff_t>(begin));
+      std::size_t last_end = begin;
+      for_each_run(labels, begin, end, [&](std::size_t first, std::size_t last, std::uint16_t label) {
+        EXPECT_TRUE(last_end <= first && first < last && last <= end) << begin << " " << end;
+        last_end = last;
+        for (std::size_t i = first; i < last; ++i) seen[i] = label;
+      });
+      EXPECT_EQ(seen, expected) << begin << " " << end;
+    }
 }
 
 }  // namespace

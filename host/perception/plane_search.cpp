@@ -163,17 +163,23 @@ void join_alike(const Overview& overview, float tau, std::vector<std::uint16_t>&
 
 /// The surface from the cells that tell its direction, widened by the cells around them that lie in it.
 Surface grow_surface(const Overview& overview, const std::vector<std::uint16_t>& labels, int model, const LocalPlane& plane, float tau) {
-  const auto core = make_surface(overview.cells, labels, model, plane, kExtentMargin + static_cast<double>(kFringeOfPlane));
-  if (!overview.has_normals() && overview.textured.empty()) return make_surface(overview.cells, labels, model, plane, kExtentMargin);
-  const auto beside = core.near_component(kFringeOfPlane);
-  auto wider = labels;
-  for (std::size_t i = 0; i < wider.size(); ++i) {
-    const auto& p = overview.cells.points[i];
-    if (!PointGrid::seen(p) || std::abs(plane.height(p)) > tau) continue;
-    const int at = core.cell_of(p);
-    if (at >= 0 && beside[static_cast<std::size_t>(at)] != 0) wider[i] = static_cast<std::uint16_t>(model);
+  const auto& points = overview.cells.points;
+  Surface surface = lay_axes(plane, model);
+  std::vector<Eigen::Vector2f> places, around;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (labels[i] == model)
+      places.push_back(surface.place_of(points[i]));
+    else if (std::abs(plane.height(points[i])) <= tau)  // nor where nothing was seen
+      around.push_back(surface.place_of(points[i]));
   }
-  return make_surface(overview.cells, wider, model, plane, kExtentMargin);
+  if (!places.empty() && (overview.has_normals() || !overview.textured.empty())) {
+    fill_surface(places, kExtentMargin + static_cast<double>(kFringeOfPlane), surface);
+    const auto beside = surface.near_component(kFringeOfPlane);
+    for (const auto& place : around)
+      if (const int at = surface.cell_at(place); at >= 0 && beside[static_cast<std::size_t>(at)] != 0) places.push_back(place);
+  }
+  fill_surface(places, kExtentMargin, surface);
+  return surface;
 }
 
 /// A surface is thin: there is more in it than above and below it. A slab through clutter or across a wall is not.
@@ -334,9 +340,12 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
 
   auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
   if (overview.has_normals()) join_alike(overview, static_cast<float>(fit.threshold), labels, planes, fit.models);
-  std::vector<Surface> surfaces;
-  for (std::size_t k = 0; k < planes.size(); ++k)
-    surfaces.push_back(grow_surface(overview, labels, static_cast<int>(k + 1), planes[k], static_cast<float>(fit.threshold)));
+  std::vector<Surface> surfaces(planes.size());
+  common::in_parallel(static_cast<int>(planes.size()), 1, options.fit.threads, [&](int first, int last) {
+    for (int k = first; k < last; ++k)
+      surfaces[static_cast<std::size_t>(k)] =
+          grow_surface(overview, labels, k + 1, planes[static_cast<std::size_t>(k)], static_cast<float>(fit.threshold));
+  });
   settle(grid, surfaces, options.fit.threads, fit);
   for (std::size_t k = 0; k < surfaces.size(); ++k)
     if (!overview.has_normals() && !stands_out(overview, flat, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;

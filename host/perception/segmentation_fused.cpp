@@ -65,7 +65,7 @@ class FusedCut {
       if (region.label != 0) order.push_back(region.label);
     order.push_back(kUncertain);
     order.push_back(kBackground);
-    std::vector<Label> cut(active_.size(), kBackground);
+    std::vector<Label> cut = energy_.cheapest();
     energy_.minimise(order, 1, cut, options_.fit.threads);  // more move next to nothing
     for (std::size_t n = 0; n < active_.size(); ++n) labels_[active_[n]] = cut[n];
     return std::move(labels_);
