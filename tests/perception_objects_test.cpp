@@ -58,6 +58,15 @@ TEST(Objects, TwoBoxesInLineWithAGapBetweenStayTwo) {
   expect_objects(perceive({{{-0.15, 0, 0.06}, {0.1, 0.04, 0.06}}, {{0.15, 0, 0.06}, {0.1, 0.04, 0.06}}}), 2);
 }
 
+TEST(Objects, WhatHangsOnAThingIsPartOfIt) {
+  const test::Box body{{0, 0, 0.1}, {0.06, 0.05, 0.1}};
+  // In the air beside it, as thick as a good handle.
+  const auto handle = perceive({body, {{0.1, -0.03, 0.13}, {0.04, 0.04, 0.035}, 0.5}});
+  EXPECT_EQ(handle.objects.support.size(), 1u);
+  // The same on the table is a thing of its own.
+  EXPECT_EQ(perceive({body, {{0.1, -0.03, 0.035}, {0.04, 0.04, 0.035}, 0.5}}).objects.support.size(), 2u);
+}
+
 TEST(Objects, TheFloorOfAVesselJoinsIt) {
   // Four walls around a piece of table.
   const auto scene = perceive({{{0, -0.1, 0.05}, {0.15, 0.005, 0.05}},
