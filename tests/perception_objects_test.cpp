@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "host/perception/objects.hpp"
+#include "host/perception/runs.hpp"
 #include "tests/perception_fixture.hpp"
 
 namespace swarmfit::perception {
@@ -57,6 +58,15 @@ TEST(Objects, TwoBoxesInLineWithAGapBetweenStayTwo) {
   expect_objects(perceive({{{-0.15, 0, 0.06}, {0.1, 0.04, 0.06}}, {{0.15, 0, 0.06}, {0.1, 0.04, 0.06}}}), 2);
 }
 
+TEST(Objects, WhatHangsOnAThingIsPartOfIt) {
+  const test::Box body{{0, 0, 0.1}, {0.06, 0.05, 0.1}};
+  // In the air beside it, as thick as a good handle.
+  const auto handle = perceive({body, {{0.1, -0.03, 0.13}, {0.04, 0.04, 0.035}, 0.5}});
+  EXPECT_EQ(handle.objects.support.size(), 1u);
+  // The same on the table is a thing of its own.
+  EXPECT_EQ(perceive({body, {{0.1, -0.03, 0.035}, {0.04, 0.04, 0.035}, 0.5}}).objects.support.size(), 2u);
+}
+
 TEST(Objects, TheFloorOfAVesselJoinsIt) {
   // Four walls around a piece of table.
   const auto scene = perceive({{{0, -0.1, 0.05}, {0.15, 0.005, 0.05}},
@@ -65,10 +75,10 @@ TEST(Objects, TheFloorOfAVesselJoinsIt) {
                                {{0.15, 0.05, 0.05}, {0.005, 0.155, 0.05}}});
   ObjectLabels one{std::vector<std::uint16_t>(scene.grid.size(), 0), {0}};
   for (std::size_t i = 0; i < scene.grid.size(); ++i) one.of_point[i] = scene.rendering.truth[i] >= 2;
-  std::vector<std::uint8_t> on_support(scene.grid.size(), 0);
+  std::vector<std::uint16_t> on_support(scene.grid.size(), 0);
   for (std::size_t i = 0; i < on_support.size(); ++i) on_support[i] = scene.rendering.truth[i] == 1;
   const auto before = one.of_point;
-  fill_basins(scene.grid, on_support, one);
+  fill_basins(scene.grid, on_support, std::vector<std::uint8_t>{0, 1}, 0, one);
   std::size_t joined = 0, inside = 0;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (before[i] != 0 || on_support[i] == 0) continue;
@@ -107,6 +117,23 @@ TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {
   EXPECT_LT(spaces[0].radius, 1.2 * 1.25 * std::sqrt(0.01 + 0.0025 + 0.01));
   EXPECT_TRUE(make_spaces(scene.grid, models, 1000000, 1.2, 0, labels).empty());
   EXPECT_EQ(std::count(labels.of_point.begin(), labels.of_point.end(), 0), static_cast<std::ptrdiff_t>(labels.of_point.size()));
+}
+
+TEST(Runs, AreTheStretchesOfEachLabelWhereverTheyBegin) {
+  const std::vector<std::uint16_t> labels{1, 0, 0, 2, 2, 3, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 0, 0, 5};
+  for (std::size_t begin = 0; begin <= labels.size(); ++begin)
+    for (std::size_t end = begin; end <= labels.size(); ++end) {
+      std::vector<std::uint16_t> seen(labels.size(), 0), expected(labels.size(), 0);
+      std::copy(labels.begin() + static_cast<std::ptrdiff_t>(begin), labels.begin() + static_cast<std::ptrdiff_t>(end),
+                expected.begin() + static_cast<std::ptrdiff_t>(begin));
+      std::size_t last_end = begin;
+      for_each_run(labels, begin, end, [&](std::size_t first, std::size_t last, std::uint16_t label) {
+        EXPECT_TRUE(last_end <= first && first < last && last <= end) << begin << " " << end;
+        last_end = last;
+        for (std::size_t i = first; i < last; ++i) seen[i] = label;
+      });
+      EXPECT_EQ(seen, expected) << begin << " " << end;
+    }
 }
 
 }  // namespace

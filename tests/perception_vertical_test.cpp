@@ -93,5 +93,25 @@ TEST(Vertical, WithWallsAloneTheImageTellsUp) {
 
 TEST(Vertical, NoPlaneNoVertical) { EXPECT_FALSE(vertical_from_planes(view(), {}, 0.2)); }
 
+TEST(Vertical, IsDecidedOnceWhatIsLeftCannotOutvoteTheGround) {
+  const auto grid = view();
+  const auto desk = plane({0, -0.8, -0.6}, 0.6, 1000), front = plane({0, 0.6, -0.8}, 1, 300), board = plane({0, -0.8, -0.6}, 0.9, 200);
+  const auto decided = [&](const std::vector<Model>& planes, std::size_t left) { return is_vertical_decided(grid, planes, left, 0.2); };
+  EXPECT_TRUE(decided({desk}, 999));
+  EXPECT_FALSE(decided({desk}, 1000));
+  EXPECT_TRUE(decided({desk, board}, 999)) << "a plane of its direction does not speak against it";
+  // One that leans to the image's bottom hardly counts; upright it would.
+  EXPECT_TRUE(decided({front, desk}, 900));
+  EXPECT_FALSE(decided({plane({0, -0.4, -0.9}, 1, 300), desk}, 900));
+  // What may as well be a wall waits for what is beside it.
+  EXPECT_FALSE(decided({plane({0, 0, -1}, 2, 1000)}, 0));
+  EXPECT_FALSE(decided({}, 0));
+  // And nothing that comes later changes it: the same vertical with another plane of all that is left.
+  const auto alone = vertical_from_planes(grid, std::vector<Model>{desk}, 0.2),
+             outvoted = vertical_from_planes(grid, std::vector<Model>{desk, plane({-0.3, -0.6, -0.7}, 1, 999)}, 0.2);
+  ASSERT_TRUE(alone && outvoted);
+  EXPECT_TRUE(alone->up.isApprox(outvoted->up));
+}
+
 }  // namespace
 }  // namespace swarmfit::perception

@@ -1,8 +1,8 @@
 #include "host/perception/colour_cost.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 
 namespace swarmfit::perception {
 namespace {
@@ -64,22 +64,17 @@ float ColourSample::cost(const Hls& colour) {
   const float *hue = hue_.data(), *lightness = lightness_.data(), *saturation = saturation_.data();
   float* distance = distances_.data();
   for (std::size_t i = 0; i < size; ++i) distance[i] = colour_distance(query, {hue[i], lightness[i], saturation[i]});
-  // Which of 64 equal bins holds the K-th nearest: what lies below counts whole, only that bin is put in order.
-  constexpr float kBins = 64;
-  std::array<int, 65> count{};
-  for (std::size_t i = 0; i < size; ++i) ++count[static_cast<std::size_t>(static_cast<int>(distance[i] * kBins))];
-  int left = neighbours_;
-  std::size_t bin = 0;
-  while (count[bin] < left) left -= count[bin++];
-  float sum = 0;
-  edge_.clear();
+  // The K nearest in order, the farthest last; few of the others come before it.
+  nearest_.assign(static_cast<std::size_t>(neighbours_), std::numeric_limits<float>::max());
   for (std::size_t i = 0; i < size; ++i) {
-    const auto in = static_cast<std::size_t>(static_cast<int>(distance[i] * kBins));
-    if (in < bin) sum += distance[i];
-    if (in == bin) edge_.push_back(distance[i]);
+    const float d = distance[i];
+    if (d >= nearest_.back()) continue;
+    std::size_t at = nearest_.size() - 1;
+    for (; at > 0 && nearest_[at - 1] > d; --at) nearest_[at] = nearest_[at - 1];
+    nearest_[at] = d;
   }
-  std::partial_sort(edge_.begin(), edge_.begin() + left, edge_.end());
-  for (int i = 0; i < left; ++i) sum += edge_[static_cast<std::size_t>(i)];
+  float sum = 0;
+  for (const float d : nearest_) sum += d;
   return sum / static_cast<float>(neighbours_);
 }
 

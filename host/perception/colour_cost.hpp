@@ -53,7 +53,7 @@ class ColourSample {
  private:
   int neighbours_, bits_;
   std::vector<float> hue_, lightness_, saturation_;  // side by side, so that the distances are one plain loop
-  std::vector<float> distances_, edge_;
+  std::vector<float> distances_, nearest_;
   std::vector<std::uint16_t> remembered_;  // in steps of 1 / 65534; 65535: not yet known
 };
 

@@ -22,6 +22,10 @@ constexpr float kOffSurface = 0.012f;     // [m]
 constexpr float kBridge = 0.35f;          // [m] between the middles of two pieces of one surface
 constexpr std::size_t kBridgeCells = 25;  // smaller patches do not tell their surface
 constexpr float kInFront = 0.005f;        // [m]
+constexpr float kClear = 0.025f;          // [m] what is seen this far behind a piece's lower border does not carry it
+constexpr double kMostlyClear = 0.5;      // of the lower border of a piece that hangs
+constexpr double kHardlyStands = 0.1;     // of it, on what is no object
+constexpr double kHardlyRests = 0.35;     // and on other pieces, which it may well touch
 
 /// What a piece looks like as a whole.
 struct Piece {
@@ -31,6 +35,14 @@ struct Piece {
   float top = 0;          // [m] along up
 };
 
+/// What lies right below a piece's lower border, in cells of the border.
+struct Footing {
+  double all = 0;
+  double clear = 0;   ///< something well behind the piece
+  double stands = 0;  ///< something near that is no object
+  double rests = 0;   ///< another piece near
+};
+
 class Assembly {
  public:
   Assembly(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const Eigen::Vector3f& up, std::vector<int> parent)
@@ -38,11 +50,18 @@ class Assembly {
 
   void absorb_fragments(const Contacts& contacts);
   void close_hollows();
+  void join_hanging(const Contacts& contacts);
   void bridge_occlusions();
   const std::vector<int>& parent() const { return parent_; }
 
  private:
   int owner(std::size_t cell) const { return patches_.label[cell] == 0 ? -1 : parent_[patches_.label[cell] - 1u]; }
+  const Eigen::Vector3f& point_at(int u, int v) const {
+    const auto at = static_cast<std::size_t>(v * coarse_.width + u);
+    return owner(at) >= 0 ? coarse_.points[at]
+                          : grid_.points[static_cast<std::size_t>(v * coarse_.stride) * static_cast<std::size_t>(grid_.width) +
+                                         static_cast<std::size_t>(u * coarse_.stride)];
+  }
   void join(int keep, int gone) {
     for (auto& p : parent_)
       if (p == gone) p = keep;
@@ -50,6 +69,8 @@ class Assembly {
   std::map<int, std::size_t> count_cells() const;
   std::map<int, Piece> describe() const;
   std::map<std::pair<int, int>, double> measure_borders() const;
+  Eigen::Vector2i downwards() const;
+  std::map<int, Footing> find_footing() const;
   bool continues(const Patch& a, const Patch& b) const;
   bool hidden_between(std::size_t patch_a, std::size_t patch_b) const;
 
@@ -172,6 +193,73 @@ void Assembly::close_hollows() {
   }
 }
 
+/// The step in the image that leads most straight down in space.
+Eigen::Vector2i Assembly::downwards() const {
+  Eigen::Vector2f rise = Eigen::Vector2f::Zero();
+  const auto width = static_cast<std::size_t>(coarse_.width);
+  for (std::size_t at = 0; at + width < patches_.label.size(); ++at) {
+    if (patches_.label[at] == 0) continue;
+    if (patches_.label[at + 1] == patches_.label[at]) rise.x() += up_.dot(coarse_.points[at + 1] - coarse_.points[at]);
+    if (patches_.label[at + width] == patches_.label[at]) rise.y() += up_.dot(coarse_.points[at + width] - coarse_.points[at]);
+  }
+  if (std::abs(rise.x()) > std::abs(rise.y())) return {rise.x() > 0 ? -1 : 1, 0};
+  return {0, rise.y() > 0 ? -1 : 1};
+}
+
+std::map<int, Footing> Assembly::find_footing() const {
+  const Eigen::Vector2i down = downwards();
+  std::map<int, Footing> footing;
+  for (int v = 0; v < coarse_.height; ++v)
+    for (int u = 0; u < coarse_.width; ++u) {
+      const auto at = static_cast<std::size_t>(v * coarse_.width + u);
+      const int o = owner(at);
+      if (o < 0) continue;
+      Footing border;
+      for (int reach = 1; reach <= kRimReach; ++reach) {
+        const int x = u + reach * down.x(), y = v + reach * down.y();
+        if (x < 0 || y < 0 || x >= coarse_.width || y >= coarse_.height) break;
+        const int other = owner(static_cast<std::size_t>(y * coarse_.width + x));
+        if (other == o) break;  // no border
+        border.all = 1;
+        const auto& p = point_at(x, y);
+        if (!PointGrid::seen(p)) continue;  // a hole: look across it
+        const bool near = (p - coarse_.points[at]).norm() < kClear;
+        if (near)
+          (other >= 0 ? border.rests : border.stands) = 1;
+        else if (p.norm() > coarse_.points[at].norm())
+          border.clear = 1;
+        break;
+      }
+      Footing& sum = footing[o];
+      sum.all += border.all;
+      sum.clear += border.clear;
+      sum.stands += border.stands;
+      sum.rests += border.rests;
+    }
+  return footing;
+}
+
+/// A piece that neither stands nor rests on anything hangs on what it touches: a handle, a spout, a brim.
+void Assembly::join_hanging(const Contacts& contacts) {
+  while (true) {
+    const auto footing = find_footing();
+    const auto cells = count_cells();
+    std::map<std::pair<int, int>, double> touch;  // of the hanging
+    for (const auto& [pair, contact] : contacts)
+      for (const auto& [one, other] : {pair, std::pair{pair.second, pair.first}}) {
+        const int a = parent_[static_cast<std::size_t>(one)], b = parent_[static_cast<std::size_t>(other)];
+        const auto found = footing.find(a);
+        if (a == b || found == footing.end() || cells.at(a) >= cells.at(b)) continue;
+        const Footing& f = found->second;
+        if (f.clear > kMostlyClear * f.all && f.stands < kHardlyStands * f.all && f.rests < kHardlyRests * f.all)
+          touch[{a, b}] += contact.length;
+      }
+    const auto most = std::max_element(touch.begin(), touch.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    if (most == touch.end()) return;
+    join(most->first.second, most->first.first);
+  }
+}
+
 /// Two patches that may be one surface.
 bool Assembly::continues(const Patch& a, const Patch& b) const {
   if (a.cells < kBridgeCells || b.cells < kBridgeCells || a.normal.dot(b.normal) < kSameSurface) return false;
@@ -191,9 +279,7 @@ bool Assembly::hidden_between(std::size_t patch_a, std::size_t patch_b) const {
     const auto at = static_cast<std::size_t>(q.y() * coarse_.width + q.x());
     const int o = owner(at);
     if (o == owner_a || o == owner_b) continue;
-    const auto pixel = static_cast<std::size_t>(q.y() * coarse_.stride) * static_cast<std::size_t>(grid_.width) +
-                       static_cast<std::size_t>(q.x() * coarse_.stride);
-    const auto& p = o >= 0 ? coarse_.points[at] : grid_.points[pixel];
+    const auto& p = point_at(q.x(), q.y());
     if (!PointGrid::seen(p)) continue;
     // Along a line in the image the inverse of the depth of a plane is linear.
     const float expected = 1 / ((1 - t) / pa.centroid.norm() + t / pb.centroid.norm());
@@ -218,6 +304,7 @@ Objects group_patches(const PointGrid& grid, const CoarseGrid& coarse, const Pat
   Assembly assembly(grid, coarse, patches, options.up, contract(patches.list.size(), contacts));
   assembly.absorb_fragments(contacts);
   assembly.close_hollows();
+  assembly.join_hanging(contacts);
   assembly.bridge_occlusions();
   Objects objects;
   std::vector<int> number(patches.list.size(), -1);

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "host/common/parallel.hpp"
+#include "host/perception/runs.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -101,21 +102,24 @@ struct Thumbnail {
   std::vector<std::uint8_t> support;
 };
 
-Thumbnail shrink(const PointGrid& grid, const std::vector<std::uint8_t>& on_support, const ObjectLabels& objects) {
+Thumbnail shrink(const PointGrid& grid, std::span<const std::uint16_t> planes, std::span<const std::uint8_t> supporting, int threads,
+                 const ObjectLabels& objects) {
   Thumbnail thumb;
   thumb.stride = std::max(1, grid.width / 320);
   thumb.width = grid.width / thumb.stride;
   thumb.height = grid.height / thumb.stride;
   thumb.object.resize(static_cast<std::size_t>(thumb.width) * static_cast<std::size_t>(thumb.height));
   thumb.support.resize(thumb.object.size());
-  std::size_t at = 0;
-  for (int v = 0; v < thumb.height; ++v)
-    for (int u = 0; u < thumb.width; ++u, ++at) {
-      const auto i =
-          static_cast<std::size_t>(v * thumb.stride) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u * thumb.stride);
-      thumb.object[at] = objects.of_point[i];
-      thumb.support[at] = objects.of_point[i] == 0 && on_support[i] != 0;
-    }
+  common::in_parallel(thumb.height, kRowsAtOnce, threads, [&](int first, int last) {
+    auto at = static_cast<std::size_t>(first) * static_cast<std::size_t>(thumb.width);
+    for (int v = first; v < last; ++v)
+      for (int u = 0; u < thumb.width; ++u, ++at) {
+        const auto i =
+            static_cast<std::size_t>(v * thumb.stride) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u * thumb.stride);
+        thumb.object[at] = objects.of_point[i];
+        thumb.support[at] = objects.of_point[i] == 0 && supporting[planes[i]] != 0;
+      }
+  });
   return thumb;
 }
 
@@ -186,7 +190,7 @@ std::uint16_t enclosing(const Thumbnail& thumb, const std::vector<int>& island, 
 
 }  // namespace
 
-ObjectLabels separate(const PointGrid& grid, const Popout& popout, const GroupingOptions& options) {
+ObjectLabels separate(const PointGrid& grid, Popout popout, const GroupingOptions& options) {
   const auto coarse = make_coarse_grid(grid, popout, options.threads);
   const auto patches = grow_patches(coarse, grid.pitch);
   const auto objects = group_patches(grid, coarse, patches, options);
@@ -196,22 +200,27 @@ ObjectLabels separate(const PointGrid& grid, const Popout& popout, const Groupin
     if (patches.list[k].cells > 0)
       labels.support[static_cast<std::size_t>(objects.of_patch[k])] = popout.support[patches.list[k].group - 1u];
   const auto cells = objects_of_cells(coarse, patches, objects);
-  labels.of_point.assign(grid.size(), 0);
+  labels.of_point = std::move(popout.group);  // each point's group makes room for its object
   common::in_parallel(grid.height, kRowsAtOnce, options.threads, [&](int first, int last) {
-    for (int v = first; v < last; ++v)
-      for (int u = 0; u < grid.width; ++u) {
-        const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
-        if (popout.group[i] == 0) continue;
-        const int cu = std::min(coarse.width - 1, u / coarse.stride), cv = std::min(coarse.height - 1, v / coarse.stride);
-        labels.of_point[i] = nearest_object(coarse, cells, grid.points[i], popout.group[i], cu, cv);
-      }
+    const auto width = static_cast<std::size_t>(grid.width);
+    for (int v = first; v < last; ++v) {
+      const std::size_t row = static_cast<std::size_t>(v) * width;
+      for_each_run(labels.of_point, row, row + width, [&](std::size_t from, std::size_t to, std::uint16_t group) {
+        const int cv = std::min(coarse.height - 1, v / coarse.stride);
+        for (std::size_t i = from; i < to; ++i) {
+          const int cu = std::min(coarse.width - 1, static_cast<int>(i - row) / coarse.stride);
+          labels.of_point[i] = nearest_object(coarse, cells, grid.points[i], group, cu, cv);
+        }
+      });
+    }
   });
   return labels;
 }
 
-void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_support, ObjectLabels& objects) {
+void fill_basins(const PointGrid& grid, std::span<const std::uint16_t> planes, std::span<const std::uint8_t> supporting, int threads,
+                 ObjectLabels& objects) {
   if (objects.support.empty()) return;  // no object, no basin
-  const auto thumb = shrink(grid, on_support, objects);
+  const auto thumb = shrink(grid, planes, supporting, threads, objects);
   std::vector<std::size_t> size(objects.support.size() + 1, 0);
   for (const auto o : thumb.object) ++size[o];
   const std::size_t largest = *std::max_element(size.begin() + 1, size.end());
@@ -238,7 +247,7 @@ void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
     for (int v = v0; v < v0 + thumb.stride; ++v)
       for (int u = u0; u < u0 + thumb.stride; ++u) {
         const auto i = static_cast<std::size_t>(v) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(u);
-        if (objects.of_point[i] == 0 && on_support[i] != 0) objects.of_point[i] = filled[at];
+        if (objects.of_point[i] == 0 && supporting[planes[i]] != 0) objects.of_point[i] = filled[at];
       }
   }
 }
@@ -246,8 +255,11 @@ void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_supp
 std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const int> models, std::size_t min_points, double margin,
                                          int threads, ObjectLabels& objects) {
   std::vector<std::vector<std::uint32_t>> members(objects.support.size());
-  for (std::size_t i = 0; i < grid.size(); ++i)
-    if (objects.of_point[i] != 0) members[objects.of_point[i] - 1u].push_back(static_cast<std::uint32_t>(i));
+  for_each_run(objects.of_point, 0, grid.size(), [&](std::size_t first, std::size_t last, std::uint16_t object) {
+    auto& of_object = members[object - 1u];
+    of_object.resize(of_object.size() + (last - first));
+    std::iota(of_object.end() - static_cast<std::ptrdiff_t>(last - first), of_object.end(), static_cast<std::uint32_t>(first));
+  });
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < members.size(); ++k)
     if (members[k].size() >= std::max<std::size_t>(1, min_points)) order.push_back(k);
@@ -271,7 +283,10 @@ std::vector<SpaceOfInterest> make_spaces(const PointGrid& grid, std::span<const 
     support.push_back(objects.support[order[k]]);
     number[order[k] + 1] = static_cast<std::uint16_t>(k + 1);
   }
-  for (auto& o : objects.of_point) o = number[o];
+  for_each_run(objects.of_point, 0, grid.size(), [&](std::size_t first, std::size_t last, std::uint16_t object) {
+    std::fill(objects.of_point.begin() + static_cast<std::ptrdiff_t>(first), objects.of_point.begin() + static_cast<std::ptrdiff_t>(last),
+              number[object]);
+  });
   objects.support = std::move(support);
   return spaces;
 }

@@ -21,11 +21,12 @@ struct ObjectLabels {
 };
 
 /// Things that touch or are stacked taken apart, on the image grid.
-ObjectLabels separate(const PointGrid& grid, const Popout& popout, const GroupingOptions& options);
+ObjectLabels separate(const PointGrid& grid, Popout popout, const GroupingOptions& options);
 
 /// What is seen of a support within a vessel is the vessel's floor: an island of the support that one object encloses joins it.
-/// `on_support[i]`: the point lies on a supporting surface.
-void fill_basins(const PointGrid& grid, const std::vector<std::uint8_t>& on_support, ObjectLabels& objects);
+/// `planes`: one label a point, of which those with `supporting[label]` are supports.
+void fill_basins(const PointGrid& grid, std::span<const std::uint16_t> planes, std::span<const std::uint8_t> supporting, int threads,
+                 ObjectLabels& objects);
 
 /// The spaces of interest, those that take up most of the view first, and `objects` renumbered so. Objects with fewer than
 /// `min_points` are debris and dropped. `models[s]`: 1-based model of surface s.

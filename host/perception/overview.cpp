@@ -81,6 +81,19 @@ std::vector<std::uint8_t> find_texture(const Cloud& frame, const Overview& overv
   return textured;
 }
 
+/// With no branch on what is unpredictable.
+template <class Predicate>
+std::vector<std::uint32_t> cells_where(const Overview& overview, const Predicate& predicate) {
+  std::vector<std::uint32_t> chosen(overview.cells.size());
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    chosen[count] = static_cast<std::uint32_t>(i);
+    count += predicate(i) ? 1 : 0;
+  }
+  chosen.resize(count);
+  return chosen;
+}
+
 }  // namespace
 
 Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads) {
@@ -113,18 +126,16 @@ Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads) {
 }
 
 std::vector<std::uint32_t> flat_cells(const Overview& overview) {
-  std::vector<std::uint32_t> chosen;
-  for (std::size_t i = 0; i < overview.cells.size(); ++i) {
-    const bool flat = overview.has_normals() ? overview.normals[i].squaredNorm() > 0 : PointGrid::seen(overview.cells.points[i]);
-    if (flat && (overview.textured.empty() || overview.textured[i] != 0)) chosen.push_back(static_cast<std::uint32_t>(i));
-  }
-  return chosen;
+  if (overview.has_normals()) return cells_where(overview, [&](std::size_t i) { return overview.normals[i].squaredNorm() > 0; });
+  return cells_where(overview, [&](std::size_t i) {
+    return PointGrid::seen(overview.cells.points[i]) && (overview.textured.empty() || overview.textured[i] != 0);
+  });
 }
 
 std::vector<std::uint32_t> flat_cells(const Overview& overview, const Eigen::Vector3f& normal, float least_cosine) {
-  auto chosen = flat_cells(overview);
-  std::erase_if(chosen, [&](std::uint32_t i) { return !overview.agrees(i, normal, least_cosine); });
-  return chosen;
+  if (!overview.has_normals()) return flat_cells(overview);  // all agree
+  // Where a cell is not flat its normal is zero, and agrees with nothing.
+  return cells_where(overview, [&](std::size_t i) { return overview.agrees(i, normal, least_cosine); });
 }
 
 }  // namespace swarmfit::perception

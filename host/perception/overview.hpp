@@ -29,7 +29,7 @@ struct Overview {
 /// `frame` is what `grid` was made from. Between textures passive stereo guesses, and its surfaces wave: there are no normals then.
 Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads = 0);
 
-/// Cells on flat surfaces, or with texture where that is what counts; with `normal` only those that agree with it.
+/// Cells on flat surfaces, or with texture where that is what counts; with `normal` only those that agree with it (least_cosine > 0).
 std::vector<std::uint32_t> flat_cells(const Overview& overview);
 std::vector<std::uint32_t> flat_cells(const Overview& overview, const Eigen::Vector3f& normal, float least_cosine);
 

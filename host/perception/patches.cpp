@@ -1,7 +1,10 @@
 #include "host/perception/patches.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <limits>
+#include <numeric>
 
 #include <Eigen/Eigenvalues>
 
@@ -97,6 +100,26 @@ void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, fl
   }
 }
 
+/// The flattest neighbourhoods first: a patch should start in the middle of a face. Digit by digit: the bits of floats >= 0 are in the order
+/// of their values.
+void sort_by_variation(const CoarseGrid& coarse, std::vector<std::uint32_t>& seeds) {
+  constexpr int kBits = 11;
+  constexpr std::uint32_t kMask = (1U << kBits) - 1;
+  struct Keyed {
+    std::uint32_t key, seed;
+  };
+  std::vector<Keyed> from(seeds.size()), to(seeds.size());
+  for (std::size_t k = 0; k < seeds.size(); ++k) from[k] = {std::bit_cast<std::uint32_t>(coarse.variation[seeds[k]]), seeds[k]};
+  for (int shift = 0; shift < 32; shift += kBits) {
+    std::array<std::size_t, kMask + 2> first{};
+    for (const Keyed& k : from) ++first[((k.key >> shift) & kMask) + 1];
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    for (const Keyed& k : from) to[first[(k.key >> shift) & kMask]++] = k;
+    from.swap(to);
+  }
+  for (std::size_t k = 0; k < seeds.size(); ++k) seeds[k] = from[k].seed;
+}
+
 /// Cells of no patch, edges mostly, join the nearest patch of their group, ring by ring.
 void absorb_rest(const CoarseGrid& coarse, Patches& patches) {
   std::vector<std::uint32_t> rest, still;
@@ -179,8 +202,7 @@ Patches grow_patches(const CoarseGrid& coarse, float pitch) {
   std::vector<std::uint32_t> seeds, queue;
   for (std::size_t at = 0; at < coarse.group.size(); ++at)
     if (coarse.group[at] != 0 && coarse.normals[at].squaredNorm() > 0) seeds.push_back(static_cast<std::uint32_t>(at));
-  // The flattest neighbourhoods first: a patch should start in the middle of a face.
-  std::stable_sort(seeds.begin(), seeds.end(), [&](std::uint32_t a, std::uint32_t b) { return coarse.variation[a] < coarse.variation[b]; });
+  sort_by_variation(coarse, seeds);
   std::vector<std::uint8_t> tried(coarse.group.size(), 0);
   for (const auto seed : seeds) {
     if (patches.label[seed] != 0 || tried[seed] != 0 || patches.list.size() >= 65000) continue;

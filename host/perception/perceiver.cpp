@@ -14,6 +14,7 @@
 #include "host/perception/plane_search.hpp"
 #include "host/perception/popout.hpp"
 #include "host/perception/recognition.hpp"
+#include "host/perception/runs.hpp"
 #include "host/perception/segmentation.hpp"
 #include "host/perception/surface.hpp"
 #include "host/perception/tracking.hpp"
@@ -59,12 +60,14 @@ std::vector<std::uint8_t> supporting_labels(const FitResult& fit) {
 /// A supporting plane does not keep what belongs to things that stand on it.
 void give_to_objects(const std::vector<std::uint16_t>& objects, FitResult& fit) {
   const auto supporting = supporting_labels(fit);
-  for (std::size_t i = 0; i < fit.labels.size(); ++i) {
-    auto& label = fit.labels[i];
-    if (objects[i] == 0 || supporting[label] == 0) continue;
-    --fit.models[label - 1u].inliers;
-    label = 0;
-  }
+  perception::for_each_run(objects, 0, fit.labels.size(), [&](std::size_t first, std::size_t last, std::uint16_t) {
+    for (std::size_t i = first; i < last; ++i) {
+      auto& label = fit.labels[i];
+      if (supporting[label] == 0) continue;
+      --fit.models[label - 1u].inliers;
+      label = 0;
+    }
+  });
 }
 
 /// An observer of planes in the grid's frame, told by one of planes in the data's.
@@ -123,7 +126,11 @@ Expected<> Perceiver::State::suit_sensor(const Cloud& frame) {
 Expected<> Perceiver::State::find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                                            PerceiveResult& result) {
   if (vertical) return {};
-  auto planes = perception::find_any_planes(*fitter, overview, stop);
+  // Stereo's planes bend, and are told best by all that there are.
+  const auto suffice = [&](std::span<const Model> planes, std::size_t left) {
+    return !stereo && perception::is_vertical_decided(grid, planes, left, options.horizontal_angle);
+  };
+  auto planes = perception::find_any_planes(*fitter, overview, suffice, stop);
   if (!planes) return tl::unexpected(planes.error());
   vertical = perception::vertical_from_planes(grid, planes->models, options.horizontal_angle);
   if (vertical) return fitter->set_options(fit_options());
@@ -147,17 +154,16 @@ void Perceiver::State::find_objects(const PointGrid& grid, const std::vector<Sur
   const auto min_points = scaled_min_points(grid, options.min_soi_points);
   // Debris beside a larger thing is part of it, a handle for example; so small groups are dropped after the grouping.
   const auto least_group = grid.organised() ? std::max<std::size_t>(1, min_points / 10) : min_points;
-  const auto popout =
+  auto popout =
       perception::pop_out(grid, supports, {options.min_height, options.max_height, options.flood_step, least_group, options.fit.threads});
-  perception::ObjectLabels objects{popout.group, popout.support};
-  if (grid.organised()) {
+  perception::ObjectLabels objects;
+  if (!grid.organised()) {
+    objects = {std::move(popout.group), std::move(popout.support)};
+  } else {
     double noise = 0;
     for (const auto& surface : supports) noise = std::max(noise, surface.noise);
-    objects = perception::separate(grid, popout, {options.flood_step, noise, result.up.cast<float>(), options.fit.threads});
-    std::vector<std::uint8_t> on_support(grid.size());
-    const auto supporting = supporting_labels(result.fit);
-    for (std::size_t i = 0; i < grid.size(); ++i) on_support[i] = supporting[result.fit.labels[i]];
-    perception::fill_basins(grid, on_support, objects);
+    objects = perception::separate(grid, std::move(popout), {options.flood_step, noise, result.up.cast<float>(), options.fit.threads});
+    perception::fill_basins(grid, result.fit.labels, supporting_labels(result.fit), options.fit.threads, objects);
   }
   std::vector<int> models;
   for (const auto& surface : supports) models.push_back(surface.model);

@@ -11,6 +11,7 @@
 namespace swarmfit::perception {
 namespace {
 
+constexpr double kThreshold = 0.01;               // [m] of planes, unless one is given
 constexpr double kNormalSlack = 0.35;             // [rad] normals of cells are noisy
 constexpr float kAlong = 0.9f;                    // cosine: a cell whose normal is farther off does not lie in the plane
 constexpr double kAgreement = 0.5;                // share of a plane's cells that lie along it; less is clutter cut by a slab
@@ -62,13 +63,22 @@ Membership count_members(const Overview& overview, const std::vector<std::uint32
   return count;
 }
 
+bool is_clutter(const Membership& count) { return static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within); }
+
+/// Of a plane; none where it is a slab through clutter.
+std::size_t cells_of(const Membership& count) { return is_clutter(count) ? 0 : count.along; }
+
+bool lies_in(const Overview& overview, std::uint32_t cell, const LocalPlane& plane, float tau) {
+  return std::abs(plane.height(overview.cells.points[cell])) <= tau && overview.agrees(cell, plane.normal, kAlong);
+}
+
 /// A fit with no model in it, for a frame in which there is nothing to fit to.
 FitResult nothing(const Fitter& fitter, std::size_t points) {
   FitResult fit;
   fit.labels.assign(points, 0);
   fit.backend = fitter.backend();
   fit.seed = fitter.options().seed;
-  fit.threshold = fitter.options().threshold.value_or(0.01);
+  fit.threshold = fitter.options().threshold.value_or(kThreshold);
   fit.stop_reason = "nothing flat to look at";
   return fit;
 }
@@ -153,17 +163,23 @@ void join_alike(const Overview& overview, float tau, std::vector<std::uint16_t>&
 
 /// The surface from the cells that tell its direction, widened by the cells around them that lie in it.
 Surface grow_surface(const Overview& overview, const std::vector<std::uint16_t>& labels, int model, const LocalPlane& plane, float tau) {
-  const auto core = make_surface(overview.cells, labels, model, plane, kExtentMargin + static_cast<double>(kFringeOfPlane));
-  if (!overview.has_normals() && overview.textured.empty()) return make_surface(overview.cells, labels, model, plane, kExtentMargin);
-  const auto beside = core.near_component(kFringeOfPlane);
-  auto wider = labels;
-  for (std::size_t i = 0; i < wider.size(); ++i) {
-    const auto& p = overview.cells.points[i];
-    if (!PointGrid::seen(p) || std::abs(plane.height(p)) > tau) continue;
-    const int at = core.cell_of(p);
-    if (at >= 0 && beside[static_cast<std::size_t>(at)] != 0) wider[i] = static_cast<std::uint16_t>(model);
+  const auto& points = overview.cells.points;
+  Surface surface = lay_axes(plane, model);
+  std::vector<Eigen::Vector2f> places, around;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (labels[i] == model)
+      places.push_back(surface.place_of(points[i]));
+    else if (std::abs(plane.height(points[i])) <= tau)  // nor where nothing was seen
+      around.push_back(surface.place_of(points[i]));
   }
-  return make_surface(overview.cells, wider, model, plane, kExtentMargin);
+  if (!places.empty() && (overview.has_normals() || !overview.textured.empty())) {
+    fill_surface(places, kExtentMargin + static_cast<double>(kFringeOfPlane), surface);
+    const auto beside = surface.near_component(kFringeOfPlane);
+    for (const auto& place : around)
+      if (const int at = surface.cell_at(place); at >= 0 && beside[static_cast<std::size_t>(at)] != 0) places.push_back(place);
+  }
+  fill_surface(places, kExtentMargin, surface);
+  return surface;
 }
 
 /// A surface is thin: there is more in it than above and below it. A slab through clutter or across a wall is not.
@@ -253,16 +269,24 @@ void erase_models(FitResult& fit, std::vector<Surface>& surfaces, std::size_t le
 
 }  // namespace
 
-Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const std::stop_token& stop) {
+Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const PlanesSuffice& suffice, const std::stop_token& stop) {
   const auto flat = flat_cells(overview);
   if (overview.has_normals() && flat.size() < kFewCells) return nothing(fitter, overview.cells.size());
   const auto values = gather(overview, flat, kCellsForDirection);
-  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), {}, stop);
+  const auto tau = static_cast<float>(fitter.options().threshold.value_or(kThreshold));
+  std::vector<Model> counted;
+  auto left = flat;
+  const auto on_model = [&](const Model& model) {
+    const auto plane = to_local(model);
+    counted.push_back(model);
+    counted.back().inliers = cells_of(count_members(overview, flat, plane, tau));
+    std::erase_if(left, [&](std::uint32_t i) { return lies_in(overview, i, plane, tau); });
+    return suffice(counted, left.size()) ? Verdict::stop : Verdict::go_on;
+  };
+  auto fitted = fitter.fit(PointsView(std::span<const float>(values), 3), on_model, stop);
   if (!fitted) return tl::unexpected(fitted.error());
-  for (auto& model : fitted->models) {
-    const auto count = count_members(overview, flat, to_local(model), static_cast<float>(fitted->threshold));
-    model.inliers = static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within) ? 0 : count.along;
-  }
+  for (auto& model : fitted->models)
+    model.inliers = cells_of(count_members(overview, flat, to_local(model), static_cast<float>(fitted->threshold)));
   std::erase_if(fitted->models, [](const Model& model) { return model.inliers == 0; });
   return fitted;
 }
@@ -283,14 +307,13 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
                        static_cast<double>(std::max<std::size_t>(1, values.size() / 3));
   // A plane's border has no normals; so cells are given the benefit of the doubt here, and points are counted in the end.
   const double reasonable = 0.5 * options.min_plane_share * static_cast<double>(grid.finite) / block;
-  const double tau = fitter.options().threshold.value_or(0.01);
+  const double tau = fitter.options().threshold.value_or(kThreshold);
   std::vector<bool> clutter;
   bool too_small = false;
   const auto on_model = [&](const Model& model) {
     too_small = static_cast<double>(model.inliers) < reasonable;
     if (too_small) return Verdict::stop;
-    const auto count = count_members(overview, flat, to_local(model), static_cast<float>(tau));
-    clutter.push_back(static_cast<double>(count.along) < kAgreement * static_cast<double>(count.within));
+    clutter.push_back(is_clutter(count_members(overview, flat, to_local(model), static_cast<float>(tau))));
     if (clutter.back() || !on_plane) return Verdict::go_on;
     Model told = model;
     to_data_frame(told, grid.origin, up);
@@ -317,9 +340,12 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
 
   auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
   if (overview.has_normals()) join_alike(overview, static_cast<float>(fit.threshold), labels, planes, fit.models);
-  std::vector<Surface> surfaces;
-  for (std::size_t k = 0; k < planes.size(); ++k)
-    surfaces.push_back(grow_surface(overview, labels, static_cast<int>(k + 1), planes[k], static_cast<float>(fit.threshold)));
+  std::vector<Surface> surfaces(planes.size());
+  common::in_parallel(static_cast<int>(planes.size()), 1, options.fit.threads, [&](int first, int last) {
+    for (int k = first; k < last; ++k)
+      surfaces[static_cast<std::size_t>(k)] =
+          grow_surface(overview, labels, k + 1, planes[static_cast<std::size_t>(k)], static_cast<float>(fit.threshold));
+  });
   settle(grid, surfaces, options.fit.threads, fit);
   for (std::size_t k = 0; k < surfaces.size(); ++k)
     if (!overview.has_normals() && !stands_out(overview, flat, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;

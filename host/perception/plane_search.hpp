@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -15,8 +17,12 @@
 
 namespace swarmfit::perception {
 
-/// Planes of any direction, each with the number of cells that lie in it and along it as its inliers; what the vertical is chosen from.
-Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const std::stop_token& stop);
+/// Whether the planes found so far tell what was asked, whatever another plane, of so many cells at most, would say.
+using PlanesSuffice = std::function<bool(std::span<const Model> planes, std::size_t cells_left)>;
+
+/// Planes of any direction, each with the number of cells that lie in it and along it as its inliers; what the vertical is chosen from. The
+/// search ends early where they `suffice`.
+Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const PlanesSuffice& suffice, const std::stop_token& stop);
 
 struct PlaneSearch {
   FitResult fit;                  ///< models with normals up, labels of all points, supporting ones marked

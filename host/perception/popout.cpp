@@ -22,11 +22,12 @@ constexpr int kPointsAtOnce = 16384;  // of a range that one thread works on
 
 /// For the points [first, last) the surface right below each, and the height above it.
 void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, std::size_t first,
-                      std::size_t last, Popout& result) {
+                      std::size_t last, std::vector<Standing>& standing) {
   const auto count = std::min<std::size_t>(surfaces.size(), kMostSurfaces);
   const auto least = static_cast<float>(options.min_height), most = static_cast<float>(options.max_height);
   for (std::size_t i = first; i < last; ++i) {
     const auto& p = grid.points[i];
+    Standing here;
     float lowest = most;
     const float range2 = p.squaredNorm();
     for (std::size_t s = 0; s < count; ++s) {
@@ -37,13 +38,14 @@ void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, 
       if (h < -fringe || (count == 1 && h <= fringe)) continue;
       if (!surfaces[s].contains(p)) continue;
       lowest = h;
-      result.above[i] = h > fringe ? static_cast<std::int8_t>(s) : std::int8_t{-1};
-      result.height[i] = h;
+      here.surface = h > fringe ? static_cast<std::uint8_t>(s + 1) : std::uint8_t{0};
     }
-    if (result.above[i] < 0) continue;
-    // Without an image grid there is no range to go by.
-    const float noise = grid.organised() ? kSeedSigmas * surfaces[static_cast<std::size_t>(result.above[i])].sigma_at(range2) : 0;
-    result.sure[i] = result.height[i] >= std::max(least, noise);
+    if (here.surface != 0) {
+      // Without an image grid there is no range to go by.
+      const float noise = grid.organised() ? kSeedSigmas * surfaces[here.surface - 1U].sigma_at(range2) : 0;
+      here.sure = lowest >= std::max(least, noise);
+    }
+    standing[i] = here;
   }
 }
 
@@ -53,7 +55,7 @@ class GridFlood {
   GridFlood(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result)
       : grid_(grid), surfaces_(surfaces), options_(options), result_(result), hole_(std::max(1, kHole * grid.width / 640)) {}
 
-  bool is_seed(std::size_t i) const { return result_.sure[i] != 0; }
+  bool is_seed(std::size_t i) const { return result_.standing[i].sure != 0; }
 
   /// Members of the group of `seed`, marked with `mark`.
   const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
@@ -69,16 +71,17 @@ class GridFlood {
 
  private:
   void spread(std::size_t at, std::uint16_t mark) {
-    const int u = static_cast<int>(at % static_cast<std::size_t>(grid_.width)),
-              v = static_cast<int>(at / static_cast<std::size_t>(grid_.width));
+    const auto width = static_cast<std::uint32_t>(grid_.width);
+    const int u = static_cast<int>(static_cast<std::uint32_t>(at) % width), v = static_cast<int>(static_cast<std::uint32_t>(at) / width);
     const auto& p = grid_.points[at];
-    const auto& surface = surfaces_[static_cast<std::size_t>(result_.above[at])];
+    const auto& surface = surfaces_[result_.standing[at].surface - 1U];
     const float step = flood_step_at(grid_, surface.noise, options_.flood_step, PointGrid::range(p));
+    const std::uint8_t above = result_.standing[at].surface;
     const auto reach = [&](int x, int y, bool across_hole) {
       if (x < 0 || y < 0 || x >= grid_.width || y >= grid_.height) return true;
       const auto to = static_cast<std::size_t>(y) * static_cast<std::size_t>(grid_.width) + static_cast<std::size_t>(x);
       if (result_.group[to] == mark) return is_seed(to);
-      if (result_.above[to] != result_.above[at] || result_.group[to] != 0) return false;
+      if (result_.standing[to].surface != above || result_.group[to] != 0) return false;
       if ((grid_.points[to] - p).squaredNorm() > step * step || (across_hole && !is_seed(to))) return false;
       result_.group[to] = mark;
       members_.push_back(static_cast<std::uint32_t>(to));
@@ -109,7 +112,7 @@ class VoxelFlood {
       if (is_seed(i)) voxels_[key(cell(grid.points[i]))].push_back(static_cast<std::uint32_t>(i));
   }
 
-  bool is_seed(std::size_t i) const { return result_.sure[i] != 0; }
+  bool is_seed(std::size_t i) const { return result_.standing[i].sure != 0; }
 
   const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
     members_.assign(1, static_cast<std::uint32_t>(seed));
@@ -134,7 +137,7 @@ class VoxelFlood {
     std::size_t kept = 0;
     for (const auto to : points) {
       if (result_.group[to] != 0) continue;
-      if (result_.above[to] == result_.above[at] && (grid_.points[to] - p).squaredNorm() <= step_ * step_) {
+      if (result_.standing[to].surface == result_.standing[at].surface && (grid_.points[to] - p).squaredNorm() <= step_ * step_) {
         result_.group[to] = mark;
         members_.push_back(to);
         continue;
@@ -171,18 +174,17 @@ bool is_border(const PointGrid& grid, const Surface& surface, const std::vector<
 }
 
 /// A thing that is cut off at max_height goes on above it: a wall, a curtain, a person.
-bool is_structure(const PointGrid& grid, const Surface& surface, const Popout& result, const std::vector<std::uint32_t>& members,
-                  const PopoutOptions& options) {
+bool is_structure(const PointGrid& grid, const Surface& surface, const std::vector<std::uint32_t>& members, const PopoutOptions& options) {
   const auto ceiling = static_cast<float>(options.max_height);
   if (!grid.organised()) {
-    const auto high =
-        std::count_if(members.begin(), members.end(), [&](std::uint32_t i) { return result.height[i] > kNearCeiling * ceiling; });
+    const auto high = std::count_if(members.begin(), members.end(),
+                                    [&](std::uint32_t i) { return surface.plane.height(grid.points[i]) > kNearCeiling * ceiling; });
     return static_cast<double>(high) > kCutShare * static_cast<double>(members.size());
   }
   std::size_t cut = 0;
   const auto width = static_cast<std::size_t>(grid.width);
   for (const std::size_t i : members) {
-    if (result.height[i] < kNearCeiling * ceiling) continue;
+    if (surface.plane.height(grid.points[i]) < kNearCeiling * ceiling) continue;
     const float step = flood_step_at(grid, surface.noise, options.flood_step, PointGrid::range(grid.points[i]));
     const auto goes_on = [&](std::size_t to) {
       return to < grid.size() && surface.plane.height(grid.points[to]) >= ceiling &&
@@ -200,11 +202,10 @@ void collect(Flood&& flood, const PointGrid& grid, std::span<const Surface> surf
     if (result.group[seed] != 0 || !flood.is_seed(seed)) continue;
     const auto mark = static_cast<std::uint16_t>(result.size.size() + 1);
     const auto& members = flood.grow(seed, mark);
-    const auto& surface = surfaces[static_cast<std::size_t>(result.above[seed])];
-    if (members.size() >= options.min_points && !is_structure(grid, surface, result, members, options) &&
-        !is_border(grid, surface, members)) {
+    const auto& surface = surfaces[result.standing[seed].surface - 1U];
+    if (members.size() >= options.min_points && !is_structure(grid, surface, members, options) && !is_border(grid, surface, members)) {
       result.size.push_back(members.size());
-      result.support.push_back(result.above[seed]);
+      result.support.push_back(result.standing[seed].surface - 1);
     } else {
       for (const auto i : members) result.group[i] = kDropped;
     }
@@ -223,11 +224,9 @@ float flood_step_at(const PointGrid& grid, double noise, double flood_step, floa
 Popout pop_out(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options) {
   Popout result;
   result.group.assign(grid.size(), 0);
-  result.above.assign(grid.size(), -1);
-  result.height.assign(grid.size(), 0);
-  result.sure.assign(grid.size(), 0);
+  result.standing.resize(grid.size());
   common::in_parallel(static_cast<int>(grid.size()), kPointsAtOnce, options.threads, [&](int first, int last) {
-    find_floor_below(grid, surfaces, options, static_cast<std::size_t>(first), static_cast<std::size_t>(last), result);
+    find_floor_below(grid, surfaces, options, static_cast<std::size_t>(first), static_cast<std::size_t>(last), result.standing);
   });
   if (grid.organised())
     collect(GridFlood(grid, surfaces, options, result), grid, surfaces, options, result);

@@ -18,13 +18,17 @@ struct PopoutOptions {
   int threads = 0;               ///< 0: as many as there are
 };
 
+/// Which surface a point stands above, the low fringe included, and whether surely so, so that more can grow from it.
+struct Standing {
+  std::uint8_t surface = 0;  ///< 0: none, s + 1: the surface s
+  std::uint8_t sure = 0;     ///< 1: surely
+};
+
 struct Popout {
   std::vector<std::uint16_t> group;  ///< one a point: 0, or k for the k-th group
   std::vector<int> support;          ///< one a group: 0-based index into the surfaces
   std::vector<std::size_t> size;     ///< one a group
-  std::vector<std::int8_t> above;    ///< one a point: -1, or the index of the surface it stands above (low fringe included)
-  std::vector<float> height;         ///< one a point, above that surface [m]
-  std::vector<std::uint8_t> sure;    ///< one a point: 1 where it surely stands above that surface, and more can grow from it
+  std::vector<Standing> standing;    ///< one a point
 };
 
 /// Groups of points above `surfaces`, within their extent, up to the next surface and `max_height`.

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "host/common/parallel.hpp"
+#include "host/perception/runs.hpp"
 #include "host/perception/segmentation_grid.hpp"
 
 namespace swarmfit::perception {
@@ -34,13 +35,15 @@ std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGr
     int left = 1 << 30, top = 1 << 30, right = -1, bottom = -1;
   };
   std::vector<Box> boxes(input.sois.size());
-  for (int v = 0; v < grid.height(); ++v)
-    for (int u = 0; u < grid.width(); ++u) {
-      const std::size_t k = input.popout[grid.index(u, v)];
-      if (k == 0 || k > boxes.size()) continue;
-      Box& box = boxes[k - 1];
-      box = {std::min(box.left, u), std::min(box.top, v), std::max(box.right, u), std::max(box.bottom, v)};
-    }
+  for (int v = 0; v < grid.height(); ++v) {
+    const std::size_t row = grid.index(0, v);
+    for_each_run(input.popout, row, grid.index(0, v + 1), [&](std::size_t first, std::size_t last, std::uint16_t k) {
+      if (k > boxes.size()) return;
+      Box& box = boxes[k - 1U];
+      box = {std::min(box.left, static_cast<int>(first - row)), std::min(box.top, v), std::max(box.right, static_cast<int>(last - row) - 1),
+             std::max(box.bottom, v)};
+    });
+  }
   std::vector<SoiRegion> regions(input.sois.size());
   const cv::Rect image(0, 0, grid.width(), grid.height());
   common::in_parallel(static_cast<int>(boxes.size()), 1, threads, [&](int first, int last) {

@@ -65,7 +65,7 @@ class FusedCut {
       if (region.label != 0) order.push_back(region.label);
     order.push_back(kUncertain);
     order.push_back(kBackground);
-    std::vector<Label> cut(active_.size(), kBackground);
+    std::vector<Label> cut = energy_.cheapest();
     energy_.minimise(order, 1, cut, options_.fit.threads);  // more move next to nothing
     for (std::size_t n = 0; n < active_.size(); ++n) labels_[active_[n]] = cut[n];
     return std::move(labels_);
@@ -117,11 +117,14 @@ class FusedCut {
           }
         }
     }
-    for (std::size_t i = 0; i < node_.size(); ++i)
-      if (node_[i] == 0) {
-        node_[i] = static_cast<int>(active_.size());
-        active_.push_back(i);
-      }
+    cv::Rect all;
+    for (const SoiRegion& region : regions_) all |= region.rect;
+    for (int v = all.y; v < all.br().y; ++v)
+      for (std::size_t i = grid_.index(all.x, v); i < grid_.index(all.br().x, v); ++i)
+        if (node_[i] == 0) {
+          node_[i] = static_cast<int>(active_.size());
+          active_.push_back(i);
+        }
   }
 
   /// Pixels of a group are settled where all depth around is of the same group; pixels of none where they are too far off.

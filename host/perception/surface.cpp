@@ -11,18 +11,19 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr float kCell = 0.02f;               // [m] finest cell
-constexpr int kMostCells = 512;              // along a side; a hall gets coarser cells
-constexpr float kGap = 0.12f;                // [m] parts of a plane this near are one surface: things stand in between and throw shadows
-constexpr float kEdge = 0.05f;               // [m] nearer to the hull is its edge
-constexpr int kUnbroken = 2;                 // [cells] a piece has no wider gaps
-constexpr double kSplinter = 0.03;           // of the largest surface's area; smaller parts are none
-constexpr double kTopArea = 0.07;            // [m^2] the largest top of a thing that is carried
-constexpr double kTopLength = 0.45;          // [m] and its longest side
-constexpr double kSeatHeight = 0.28;         // [m] from here on it is rather a piece of furniture, and a thing's top is smaller:
-constexpr double kHighTopArea = 0.03;        // [m^2]
-constexpr double kReasonableArea = 0.01;     // [m^2] nothing smaller carries anything
-constexpr float kNoiseAtOneMetre = 0.0015f;  // [m] where there are too few inliers to measure it
+constexpr float kCell = 0.02f;                  // [m] finest cell
+constexpr int kMostCells = 512;                 // along a side; a hall gets coarser cells
+constexpr float kGap = 0.12f;                   // [m] parts of a plane this near are one surface: things stand in between and throw shadows
+constexpr float kEdge = 0.05f;                  // [m] nearer to the hull is its edge
+constexpr int kUnbroken = 2;                    // [cells] a piece has no wider gaps
+constexpr double kSplinter = 0.03;              // of the largest surface's area; smaller parts are none
+constexpr double kTopArea = 0.07;               // [m^2] the largest top of a thing that is carried
+constexpr double kTopLength = 0.45;             // [m] and its longest side
+constexpr double kSeatHeight = 0.28;            // [m] from here on it is rather a piece of furniture, and a thing's top is smaller:
+constexpr double kHighTopArea = 0.03;           // [m^2]
+constexpr double kReasonableArea = 0.01;        // [m^2] nothing smaller carries anything
+constexpr std::size_t kPointsForNoise = 16384;  // of a frame are looked at
+constexpr float kNoiseAtOneMetre = 0.0015f;     // [m] where there are too few inliers to measure it
 
 using Points2 = std::vector<Eigen::Vector2f>;
 
@@ -191,10 +192,9 @@ Points2 largest_piece(const std::vector<int>& hits, const Surface& surface) {
   return *std::max_element(cells.begin(), cells.end(), [](const Points2& a, const Points2& b) { return a.size() < b.size(); });
 }
 
-void lay_out_cells(const PointGrid& grid, const std::vector<std::uint32_t>& members, double margin, Surface& surface) {
+void lay_out_cells(std::span<const Eigen::Vector2f> places, double margin, Surface& surface) {
   Eigen::Vector2f low = Eigen::Vector2f::Constant(std::numeric_limits<float>::max()), high = -low;
-  for (const auto i : members) {
-    const Eigen::Vector2f q(surface.axis_a.dot(grid.points[i]), surface.axis_b.dot(grid.points[i]));
+  for (const auto& q : places) {
     low = low.cwiseMin(q);
     high = high.cwiseMax(q);
   }
@@ -227,22 +227,32 @@ std::optional<double> rise_above(const Surface& small, const Surface& large) {
 
 }  // namespace
 
-Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> labels, int model, const LocalPlane& plane, double margin) {
+Surface lay_axes(const LocalPlane& plane, int model) {
   Surface surface;
   surface.plane = plane;
   surface.model = model;
   surface.axis_a = plane.normal.unitOrthogonal();
   surface.axis_b = plane.normal.cross(surface.axis_a);
-  std::vector<std::uint32_t> members;
-  for (std::size_t i = 0; i < grid.size(); ++i)
-    if (labels[i] == model && PointGrid::seen(grid.points[i])) members.push_back(static_cast<std::uint32_t>(i));
   surface.noise = kNoiseAtOneMetre;
-  if (members.empty()) return surface;
-  lay_out_cells(grid, members, margin, surface);
+  return surface;
+}
+
+Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> labels, int model, const LocalPlane& plane, double margin) {
+  Surface surface = lay_axes(plane, model);
+  std::vector<Eigen::Vector2f> places;
+  for (std::size_t i = 0; i < grid.size(); ++i)
+    if (labels[i] == model && PointGrid::seen(grid.points[i])) places.push_back(surface.place_of(grid.points[i]));
+  fill_surface(places, margin, surface);
+  return surface;
+}
+
+void fill_surface(std::span<const Eigen::Vector2f> places, double margin, Surface& surface) {
+  if (places.empty()) return;
+  lay_out_cells(places, margin, surface);
 
   std::vector<int> hits(static_cast<std::size_t>(surface.columns) * static_cast<std::size_t>(surface.rows), 0);
-  for (const auto i : members)
-    if (const int at = surface.cell_of(grid.points[i]); at >= 0) ++hits[static_cast<std::size_t>(at)];
+  for (const auto& q : places)
+    if (const int at = surface.cell_at(q); at >= 0) ++hits[static_cast<std::size_t>(at)];
   int groups = 0;
   const auto group = group_cells(hits, surface.columns, surface.rows, std::max(1, static_cast<int>(kGap / surface.cell)), &groups);
 
@@ -251,6 +261,7 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
   for (const auto& part : cells) largest = std::max(largest, part.size());
   surface.extent.assign(hits.size(), 0);
   surface.component.assign(hits.size(), 0);
+  surface.area = 0;
   const double cell_area = static_cast<double>(surface.cell) * static_cast<double>(surface.cell);
   std::vector<bool> kept(cells.size());
   for (std::size_t g = 0; g < cells.size(); ++g) {
@@ -264,7 +275,6 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
   surface.piece_area = polygon_area(convex_hull(row_ends(piece)));
   surface.piece_length = principal_length(piece);
   for (std::size_t at = 0; at < group.size(); ++at) surface.component[at] = group[at] != 0 && kept[static_cast<std::size_t>(group[at] - 1)];
-  return surface;
 }
 
 std::vector<std::uint8_t> Surface::near_component(float reach) const {
@@ -274,7 +284,8 @@ std::vector<std::uint8_t> Surface::near_component(float reach) const {
 
 double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> labels, const Surface& surface) {
   std::vector<float> scaled;
-  for (std::size_t i = 0; i < grid.size(); i += 7)
+  const std::size_t step = std::max<std::size_t>(1, grid.size() / kPointsForNoise) | 1U;  // odd: not one column of the image
+  for (std::size_t i = 0; i < grid.size(); i += step)
     if (labels[i] == surface.model)
       scaled.push_back(std::abs(surface.plane.height(grid.points[i])) / std::max(0.25f, grid.points[i].squaredNorm()));
   if (scaled.size() < 50 || !grid.organised()) return kNoiseAtOneMetre;

@@ -25,9 +25,12 @@ struct Surface {
   double piece_length = 0;              ///< of that piece, along its principal axis [m]
   double noise = 0;                     ///< standard deviation of the inliers' heights at a range of one metre; grows with its square
 
+  /// In the plane's own coordinates [m].
+  Eigen::Vector2f place_of(const Eigen::Vector3f& p) const noexcept { return {axis_a.dot(p), axis_b.dot(p)}; }
   /// Its place in the bitmap, or -1 outside.
-  int cell_of(const Eigen::Vector3f& p) const noexcept {
-    const float a = (axis_a.dot(p) - low.x()) * per_metre, b = (axis_b.dot(p) - low.y()) * per_metre;
+  int cell_of(const Eigen::Vector3f& p) const noexcept { return cell_at(place_of(p)); }
+  int cell_at(const Eigen::Vector2f& place) const noexcept {
+    const float a = (place.x() - low.x()) * per_metre, b = (place.y() - low.y()) * per_metre;
     if (!(a >= 0 && b >= 0 && a < static_cast<float>(columns) && b < static_cast<float>(rows))) return -1;
     return static_cast<int>(b) * columns + static_cast<int>(a);
   }
@@ -50,7 +53,13 @@ struct Surface {
   float sigma_at(float range_squared) const noexcept { return static_cast<float>(noise) * std::max(0.25f, range_squared); }
 };
 
-/// `labels[i] == model` marks the plane's points. `margin` [m] widens the hull.
+/// A plane with its axes, no bitmap yet.
+Surface lay_axes(const LocalPlane& plane, int model);
+
+/// The bitmap of points at these places. `margin` [m] widens the hull.
+void fill_surface(std::span<const Eigen::Vector2f> places, double margin, Surface& surface);
+
+/// Both, of the points with labels[i] == model.
 Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> labels, int model, const LocalPlane& plane, double margin);
 
 /// Standard deviation of the heights of the surface's points at a range of one metre, robustly.

@@ -1,5 +1,6 @@
 #include "host/perception/vertical.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -14,6 +15,7 @@ constexpr double kCeilingWeight = 0.02;
 constexpr double kLeans = 0.35;      // across the image; cameras are seldom rolled
 constexpr double kParallel = 0.995;  // cosine of 6 degrees
 constexpr double kLeanWeight = 0.2;
+constexpr int kLooks = 64;  // at most about so many rays a row tell where the image's bottom is
 
 /// Where the image's right and its bottom lie in the cloud's frame; empty without an image grid.
 struct ImageAxes {
@@ -29,8 +31,9 @@ std::optional<ImageAxes> image_axes(const PointGrid& grid) {
         .cast<double>()
         .normalized();
   };
-  for (int v = 0; v + dv < grid.height; v += 4)
-    for (int u = 0; u + du < grid.width; u += 4) {
+  const int step = std::max(1, grid.width / kLooks);
+  for (int v = 0; v + dv < grid.height; v += step)
+    for (int u = 0; u + du < grid.width; u += step) {
       const Eigen::Vector3d here = ray(u, v), beside = ray(u + du, v), below = ray(u, v + dv);
       if (beside.allFinite() && here.allFinite()) right += beside - here;
       if (below.allFinite() && here.allFinite()) down += below - here;
@@ -52,6 +55,20 @@ double plausibility(const Eigen::Vector3d& normal, const std::optional<ImageAxes
   return lean < kLeans ? weight : weight * kLeanWeight;
 }
 
+struct Weighed {
+  std::vector<Eigen::Vector3d> normals;  // towards the camera
+  std::vector<double> weights;
+};
+
+Weighed weigh(const PointGrid& grid, std::span<const Model> planes, const std::optional<ImageAxes>& axes) {
+  Weighed out;
+  for (const auto& plane : planes) {
+    out.normals.push_back(facing(grid, plane));
+    out.weights.push_back(static_cast<double>(plane.inliers) * plausibility(out.normals.back(), axes));
+  }
+  return out;
+}
+
 }  // namespace
 
 Vertical vertical_from_gravity(const Eigen::Vector3d& gravity) { return {-gravity.normalized(), "gravity"}; }
@@ -61,12 +78,7 @@ Vertical vertical_from_tilt(double tilt) { return {Eigen::Vector3d(0, -std::cos(
 std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, double horizontal_angle) {
   if (planes.empty()) return std::nullopt;
   const auto axes = image_axes(grid);
-  std::vector<Eigen::Vector3d> normals;
-  std::vector<double> weights;
-  for (const auto& plane : planes) {
-    normals.push_back(facing(grid, plane));
-    weights.push_back(static_cast<double>(plane.inliers) * plausibility(normals.back(), axes));
-  }
+  const auto [normals, weights] = weigh(grid, planes, axes);
   const auto alike = [&](std::size_t i, std::size_t j) { return std::abs(normals[i].dot(normals[j])) > std::cos(horizontal_angle); };
   std::size_t centre = 0;
   double most = -1;
@@ -98,6 +110,19 @@ std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<co
     }
   }
   return Vertical{normal, kFromDominantPlane};
+}
+
+bool is_vertical_decided(const PointGrid& grid, std::span<const Model> planes, std::size_t left, double horizontal_angle) {
+  const auto axes = image_axes(grid);
+  if (planes.empty() || !axes) return false;
+  const auto [normals, weights] = weigh(grid, planes, axes);
+  const auto most = static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
+  // What only may be a floor is judged by the planes beside it.
+  if (plausibility(normals[most], axes) < 1) return false;
+  auto against = static_cast<double>(left);
+  for (std::size_t j = 0; j < normals.size(); ++j)
+    if (std::abs(normals[most].dot(normals[j])) <= std::cos(horizontal_angle)) against += weights[j];
+  return weights[most] > against;
 }
 
 }  // namespace swarmfit::perception

@@ -31,4 +31,8 @@ Vertical vertical_from_tilt(double tilt);
 /// Empty where there is no plane.
 std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, double horizontal_angle);
 
+/// Whether further planes, of `left` inliers in all, leave that vertical as it is: one that an upright camera could see as a floor or a table
+/// outweighs whatever is not of its direction.
+bool is_vertical_decided(const PointGrid& grid, std::span<const Model> planes, std::size_t left, double horizontal_angle);
+
 }  // namespace swarmfit::perception
