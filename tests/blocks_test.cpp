@@ -244,6 +244,23 @@ TEST(PruningEdges, NewCapsAreHeeded) {
   EXPECT_EQ(costs_of(*pruned, scene, Loss::truncated_l1, {}), costs_of(*brute, scene, Loss::truncated_l1, {}));
 }
 
+TEST(PruningEdges, PointsThatComeInOrderCostTheSame) {
+  // In any order: that a cloud is said to be ordered may cost time, never exactness.
+  const Scene scene = random_scene(ModelKind::plane, 9, 30000, 64);
+  const auto sorted = make(true), as_given = make(true), brute = make(false);
+  load(*sorted, scene);
+  PointsView ordered = scene.view();
+  ordered.ordered = true;
+  ASSERT_TRUE(as_given->set_points(ordered));
+  ASSERT_TRUE(as_given->set_caps(scene.caps));
+  ASSERT_TRUE(brute->set_points(ordered));
+  ASSERT_TRUE(brute->set_caps(scene.caps));
+  const std::vector<float> truth = costs_of(*brute, scene, Loss::truncated_l1, {});
+  EXPECT_EQ(costs_of(*as_given, scene, Loss::truncated_l1, {}), truth);
+  const std::vector<float> blocked = costs_of(*sorted, scene, Loss::truncated_l1, {});
+  for (std::size_t j = 0; j < truth.size(); ++j) EXPECT_NEAR(blocked[j], truth[j], 1e-5 * truth[j]);
+}
+
 TEST(MortonOrder, IsAPermutationOfNeighbours) {
   for (const std::size_t dimensions : {2U, 3U}) {
     std::mt19937 engine(5);

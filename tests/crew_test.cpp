@@ -1,0 +1,96 @@
+// The CPU back end's threads: every task once, whatever the number of threads and however long they slept.
+#include "kernels/cpu/crew.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <new>
+#include <numeric>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "kernels/cpu/tasks.hpp"
+
+namespace swarmfit::kernels::cpu {
+namespace {
+
+/// How often each of so many tasks was done.
+std::vector<int> done_by(Crew& crew, std::size_t tasks) {
+  std::vector<std::atomic<int>> times(tasks);
+  run_in(crew, true, [&] { for_each_task(tasks, [&](std::size_t task) { ++times[task]; }); });
+  return {times.begin(), times.end()};
+}
+
+class CrewOf : public testing::TestWithParam<int> {};
+
+TEST_P(CrewOf, DoesEveryTaskOnce) {
+  Crew crew(GetParam());
+  for (const std::size_t tasks : {0U, 1U, 2U, 3U, 7U, 64U, 1000U}) {
+    for (int again = 0; again < 50; ++again) EXPECT_EQ(done_by(crew, tasks), std::vector<int>(tasks, 1));
+  }
+}
+
+TEST_P(CrewOf, WakesUpAgain) {
+  Crew crew(GetParam());
+  for (int again = 0; again < 5; ++again) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));  // longer than helpers stay awake
+    EXPECT_EQ(done_by(crew, 100), std::vector<int>(100, 1));
+  }
+}
+
+TEST_P(CrewOf, SeesWhatItsTasksWrote) {
+  Crew crew(GetParam());
+  std::vector<std::size_t> numbers(5000);
+  for (std::size_t round = 1; round < 200; ++round) {
+    run_in(crew, true, [&] { for_each_task(numbers.size(), [&](std::size_t task) { numbers[task] += task * round; }); });
+  }
+  for (std::size_t task = 0; task < numbers.size(); ++task) ASSERT_EQ(numbers[task], task * (199 * 200 / 2));
+}
+
+TEST_P(CrewOf, ThrowsWhatATaskThrewAndGoesOn) {
+  Crew crew(GetParam());
+  for (int again = 0; again < 20; ++again) {
+    const auto failing = [&] {
+      run_in(crew, true, [&] {
+        for_each_task(50, [&](std::size_t task) {
+          if (task == 31) throw std::bad_alloc();
+        });
+      });
+    };
+    EXPECT_THROW(failing(), std::bad_alloc);
+    EXPECT_EQ(current_crew(), nullptr);
+    EXPECT_EQ(done_by(crew, 20), std::vector<int>(20, 1));
+  }
+}
+
+TEST_P(CrewOf, MayGoWhileHelpersAreAwake) {
+  for (int again = 0; again < 100; ++again) {
+    Crew crew(GetParam());
+    EXPECT_EQ(done_by(crew, 3), std::vector<int>(3, 1));
+  }
+}
+
+TEST_P(CrewOf, WorksBesideOthers) {
+  std::vector<std::jthread> callers;
+  std::atomic<int> wrong = 0;
+  for (int caller = 0; caller < 4; ++caller) {
+    callers.emplace_back([&] {
+      Crew crew(GetParam());
+      for (int again = 0; again < 200; ++again) wrong += done_by(crew, 9) != std::vector<int>(9, 1) ? 1 : 0;
+    });
+  }
+  callers.clear();
+  EXPECT_EQ(wrong, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, CrewOf, testing::Values(1, 2, 3, 8));
+
+TEST(Tasks, RunWithoutACrewAsWell) {
+  std::vector<std::atomic<int>> times(40);
+  for_each_task(times.size(), [&](std::size_t task) { ++times[task]; });
+  for (const auto& count : times) EXPECT_EQ(count, 1);
+}
+
+}  // namespace
+}  // namespace swarmfit::kernels::cpu
