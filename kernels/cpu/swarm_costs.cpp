@@ -12,6 +12,7 @@ namespace {
 
 /// Runs of tiles; few, so that partial sums stay small whatever the size of the cloud.
 constexpr std::size_t kMaxRuns = 128;
+constexpr std::size_t kManyRuns = 32;
 /// Points x models below which looking at the blocks first cannot pay for the extra passes.
 constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 /// Share of the residuals computed above which pruning pauses, for twice as long each time up to the longest pause.
@@ -32,15 +33,21 @@ struct Runs {
 /// body(run, first model, models) for each run of tiles and group of models.
 template <class Body>
 void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
-  const std::size_t groups = (models + kGroupModels - 1) / kGroupModels, tasks = runs.count * groups;
+  const std::size_t groups = (models + kGroupModels - 1) / kGroupModels;
   // Alike in size, and whole register tiles but for the last group.
   constexpr std::size_t kMultiple = 8;
   static_assert(kGroupModels % kMultiple == 0);
   const std::size_t even = groups > 0 ? (models + groups - 1) / groups : 0, size = (even + kMultiple - 1) / kMultiple * kMultiple;
+  // Where there are runs enough for all threads, one thread takes all groups over a run while it is in its caches.
+  const std::size_t parts = runs.count < kManyRuns ? groups : 1;
   const auto one = [&](std::size_t task) {
-    const std::size_t first = task % groups * size;
-    body(task / groups, first, std::min(size, models - first));
+    const std::size_t part = task % parts;
+    for (std::size_t group = part; group < groups; group += parts) {
+      const std::size_t first = group * size;
+      body(task / parts, first, std::min(size, models - first));
+    }
   };
+  const std::size_t tasks = groups > 0 ? runs.count * parts : 0;
   if (worth_sharing(runs.points, models)) {
     for_each_task(tasks, one);
   } else {
@@ -79,11 +86,13 @@ bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, 
 std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
                                        std::span<float> costs) {
   const Runs runs(points);
-  partial_.assign(runs.count * swarm.count, {});
+  partial_.resize(runs.count * swarm.count);
   for_tasks(runs, swarm.count, [&](std::size_t run, std::size_t first, std::size_t models) {
+    PartialCost* const costs_of_run = partial_.data() + run * swarm.count + first;
+    std::fill_n(costs_of_run, models, PartialCost{});
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
       kernels_.add_costs(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
-                         partial_.data() + run * swarm.count + first);
+                         costs_of_run);
     }
   });
   for (std::size_t j = 0; j < swarm.count; ++j) {
