@@ -65,7 +65,7 @@ class SwarmCosts {
   int pause_ = 0;  ///< evaluations to go before pruning is tried again
   int last_pause_ = 0;
 
-  std::vector<PartialCost> partial_;  ///< a run of tiles and a model
+  std::vector<PartialCost> partial_;    ///< a run of tiles and a model
   std::vector<std::uint64_t> touched_;  ///< a group of models
 };
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <memory>
+#include <type_traits>
 #include <utility>
 
 #include <oneapi/tbb/parallel_for.h>
@@ -33,8 +35,9 @@ void for_each_task(std::size_t tasks, Body&& body) {
     body(std::size_t{0});
   } else if (Crew* crew = current_crew(); crew != nullptr) {
     using Callable = std::remove_reference_t<Body>;
-    crew->run(tasks, [](void* context, std::size_t task) { (*static_cast<Callable*>(context))(task); },
-              const_cast<void*>(static_cast<const void*>(std::addressof(body))));
+    crew->run(
+        tasks, [](void* context, std::size_t task) { (*static_cast<Callable*>(context))(task); },
+        const_cast<void*>(static_cast<const void*>(std::addressof(body))));
   } else if (tasks > 1) {
     tbb::parallel_for(std::size_t{0}, tasks, body);
   }
