@@ -31,6 +31,21 @@ python_environment() {
   fi
 }
 
+# docs_environment: build/docs/environment, a virtual environment with what the documentation's site is built with. Says why where it cannot
+# be made, and fails.
+docs_environment() {
+  local folder=$root/build/docs/environment list=docs/site/requirements.txt log=$root/build/docs/environment.log
+  if cmp --quiet "$list" "$folder/installed"; then return 0; fi
+  mkdir -p "$root/build/docs"
+  if { python3 -m venv --clear "$folder" && "$folder/bin/python" -m pip install --quiet --disable-pip-version-check -r "$list"; } \
+      >"$log" 2>&1; then
+    cp "$list" "$folder/installed"
+  else
+    echo "skipped: the site is not built: $(tail -n 1 "$log")" >&2
+    return 1
+  fi
+}
+
 # report_packages: report/node_modules, what the page of --report is bundled from. Says why where it cannot be had, and fails.
 report_packages() {
   local stamp=report/node_modules/.installed wanted log=$root/build/report-packages.log

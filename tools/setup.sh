@@ -16,6 +16,8 @@ packages=(
   libgtest-dev libbenchmark-dev
   # the Python package; nanobind comes from pip
   python3-dev python3-venv
+  # the documentation's site reads the headers with it; the rest of it comes from pip
+  doxygen
   # the installed pkg-config file
   pkgconf
   # the Motorcycle stereo pair

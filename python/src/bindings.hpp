@@ -10,6 +10,7 @@ void bind_models(nanobind::module_& module);
 void bind_clouds(nanobind::module_& module);
 void bind_fitting(nanobind::module_& module);
 void bind_perception(nanobind::module_& module);
+void bind_reporting(nanobind::module_& module);
 void bind_machine(nanobind::module_& module);
 
 }  // namespace swarmfit::python

@@ -162,11 +162,14 @@ void bind_clouds(nb::module_& module) {
       "left"_a, "right"_a, "calib"_a);
   module.def(
       "make_room_scene",
-      [](std::uint64_t seed, int width, int height) {
+      [](std::uint64_t seed, int width, int height, std::size_t frame, std::size_t frames) {
         if (width < 1 || height < 1) raise({Error::Kind::invalid_option, "width and height must be >= 1 [px]"});
-        return without_lock([&]() -> Expected<Cloud> { return make_room_scene(seed, width, height).cloud; });
+        if (frame >= frames) {
+          raise({Error::Kind::invalid_option, "frame is " + std::to_string(frame) + ", must be less than frames, " + std::to_string(frames)});
+        }
+        return without_lock([&]() -> Expected<Cloud> { return make_room_scene(seed, width, height, walk_in_room(frame, frames)).cloud; });
       },
-      "seed"_a = 1, "width"_a = 640, "height"_a = 480);
+      "seed"_a = 1, "width"_a = 640, "height"_a = 480, "frame"_a = 0, "frames"_a = 1);
 }
 
 }  // namespace swarmfit::python

@@ -11,6 +11,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <swarmfit/fit.hpp>
+#include <swarmfit/report.hpp>
 
 #include "python/src/bindings.hpp"
 #include "python/src/buffers.hpp"
@@ -34,10 +35,12 @@ Job<FitResult>::Work work(Fitter& fitter, const PointsView& points, std::vector<
   };
 }
 
-FitResult fit_to_end(std::shared_ptr<Workshop> workshop, nb::handle points, nb::handle on_model, std::vector<Model> warm_start) {
+FitResult fit_to_end(std::shared_ptr<Workshop> workshop, nb::handle points, nb::handle on_model, std::vector<Model> warm_start,
+                     SearchRecord* record) {
   const Shift shift(std::move(workshop), "Fitter");
   const Buffer buffer(points);
-  return value_of(run_to_end<FitResult>(work(shift.tool(), points_view(buffer), std::move(warm_start)), on_model));
+  auto job = work(shift.tool(), points_view(buffer), std::move(warm_start));
+  return value_of(run_to_end<FitResult>(recorded<FitResult>(shift.tool(), record, std::move(job)), on_model));
 }
 
 /// Models one by one while the search for the next goes on.
@@ -106,7 +109,8 @@ void bind_fitting(nb::module_& module) {
       .def("result", &ModelStream::result, nb::rv_policy::reference_internal);
   nb::class_<Workshop>(module, "Fitter")
       .def(nb::new_([](const nb::kwargs& options) { return make_tool<Fitter>(fit_options(options)); }))
-      .def("fit", &fit_to_end, "points"_a, "on_model"_a = nb::none(), "warm_start"_a = std::vector<Model>())
+      .def("fit", &fit_to_end, "points"_a, "on_model"_a = nb::none(), "warm_start"_a = std::vector<Model>(),
+           "record"_a = nb::none())
       .def(
           "find_models",
           [](std::shared_ptr<Workshop> self, nb::handle points, std::vector<Model> warm_start) {

@@ -16,6 +16,7 @@
 
 #include <swarmfit/error.hpp>
 #include <swarmfit/fit.hpp>
+#include <swarmfit/report.hpp>
 
 namespace swarmfit::python {
 
@@ -113,6 +114,23 @@ class Job {
   std::optional<Expected<Result>> result_;
   std::jthread thread_;  // last: it uses all of the above
 };
+
+/// The same work, its swarms' steps and the models as they are found put down in `record`; null: the work as it is.
+template <class Result, class ToolType>
+typename Job<Result>::Work recorded(ToolType& tool, SearchRecord* record, typename Job<Result>::Work work) {
+  if (record == nullptr) return work;
+  return [&tool, record, work = std::move(work)](const ModelCallback& on_model, std::stop_token stop) {
+    tool.observe([record](const SwarmStep& step) { record->add(step); });
+    auto result = work(
+        [record, &on_model](const Model& model) {
+          record->add(model);
+          return on_model ? on_model(model) : Verdict::go_on;
+        },
+        std::move(stop));
+    tool.observe({});
+    return result;
+  };
+}
 
 /// Waits for the end of the work; `on_model`, where there is one, is told of each model and returns False to stop.
 template <class Result>

@@ -129,6 +129,7 @@ void bind_models(nb::module_& module) {
       .def_ro("cost", &Model::cost)
       .def_ro("rms", &Model::rms)
       .def_ro("supporting", &Model::supporting)
+      .def_ro("id", &Model::id)
       .def_ro("iterations", &Model::iterations)
       .def_ro("evaluations", &Model::evaluations)
       .def_ro("points_touched", &Model::points_touched)

@@ -13,5 +13,6 @@ NB_MODULE(_core, module) {
   swarmfit::python::bind_clouds(module);
   swarmfit::python::bind_fitting(module);
   swarmfit::python::bind_perception(module);
+  swarmfit::python::bind_reporting(module);
   swarmfit::python::bind_machine(module);
 }

@@ -147,6 +147,9 @@ bool set(PerceiveOptions& o, std::string_view name, nb::handle value) {
     real(o.smoothness);
   } else if (name == "gallery") {
     o.gallery = path(value);
+  } else if (name == "track") {
+    if (!PyBool_Check(value.ptr())) throw nb::type_error(("track is " + shown(value) + ", must be True or False").c_str());
+    o.track = value.is(nb::handle(Py_True));
   } else {
     return name != "model" && set(o.fit, name, value);
   }

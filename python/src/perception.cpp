@@ -9,6 +9,7 @@
 #include <nanobind/stl/string.h>
 
 #include <swarmfit/perception.hpp>
+#include <swarmfit/report.hpp>
 #include <swarmfit/results.hpp>
 
 #include "python/src/bindings.hpp"
@@ -27,11 +28,13 @@ namespace {
 
 using Eye = Tool<Perceiver>;
 
-PerceiveResult perceive(std::shared_ptr<Eye> eye, const Cloud& frame, nb::handle on_plane) {
+PerceiveResult perceive(std::shared_ptr<Eye> eye, const Cloud& frame, nb::handle on_plane, SearchRecord* record) {
   const Shift shift(std::move(eye), "Perceiver");
-  return value_of(run_to_end<PerceiveResult>(
-      [&](const ModelCallback& on_model, std::stop_token stop) { return shift.tool().perceive(frame, on_model, std::move(stop)); },
-      on_plane));
+  return value_of(run_to_end<PerceiveResult>(recorded<PerceiveResult>(shift.tool(), record,
+                                                                      [&](const ModelCallback& on_model, std::stop_token stop) {
+                                                                        return shift.tool().perceive(frame, on_model, std::move(stop));
+                                                                      }),
+                                             on_plane));
 }
 
 nb::frozen<double> vector_of(const Eigen::Vector3d& v, nb::handle owner) { return view_of(v.data(), {3}, owner); }
@@ -94,6 +97,7 @@ void bind_perception(nb::module_& module) {
       .def_ro("radius", &SpaceOfInterest::radius)
       .def_ro("points", &SpaceOfInterest::points)
       .def_ro("plane", &SpaceOfInterest::plane)
+      .def_ro("id", &SpaceOfInterest::id)
       .def_prop_ro("bbox", [](const SpaceOfInterest& s) { return nb::make_tuple(s.bbox[0], s.bbox[1], s.bbox[2], s.bbox[3]); })
       .def_prop_ro("recognised", &recognised)
       .def("__repr__", [](const SpaceOfInterest& s) {
@@ -128,7 +132,7 @@ void bind_perception(nb::module_& module) {
           "folder"_a, "cloud"_a);
   nb::class_<Eye>(module, "Perceiver")
       .def(nb::new_([](const nb::kwargs& options) { return make_tool<Perceiver>(perceive_options(options)); }))
-      .def("perceive", &perceive, "cloud"_a, "on_plane"_a = nb::none());
+      .def("perceive", &perceive, "cloud"_a, "on_plane"_a = nb::none(), "record"_a = nb::none());
   module.attr("UNCERTAIN") = kUncertain;
 }
 

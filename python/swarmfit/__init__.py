@@ -42,7 +42,7 @@ from ._core import (
     model_types,
 )
 from ._inputs import Points, camera_of, cloud_of, frame_of, points_of
-from ._results import FitResult, PerceiveResult, Stats, fit_result, perceive_result
+from ._results import FitResult, PerceiveResult, Stats, Told, fit_result, perceive_result
 
 if TYPE_CHECKING:
     import os
@@ -121,6 +121,7 @@ _PERCEIVE_OPTIONS = """
         segmentation: how things are outlined, by "graphcut" or by "fixation", a contour around each thing's centre.
         colour_neighbours, uncertain_cost, smoothness: of the outlines' graph cut.
         gallery: a folder of names for what is found: one image, or one folder of images, a name.
+        track: frames follow each other (a Perceiver's): the last one's planes seed the search, planes and things keep their `id`.
 """
 
 
@@ -135,9 +136,10 @@ def _documented(options: str) -> Callable[[_T], _T]:
 class ModelStream:
     """Iterates over models as they are found; the search for the next goes on meanwhile. Leaving it, or a with block, ends the search."""
 
-    def __init__(self, stream: _core.ModelStream, points: Points) -> None:
+    def __init__(self, stream: _core.ModelStream, points: Points, told: Told) -> None:
         self._stream = stream
         self._points = points
+        self._told = told
 
     def __iter__(self) -> Iterator[Model]:
         return self
@@ -151,7 +153,7 @@ class ModelStream:
 
     def result(self) -> FitResult:
         """Waits for the end: all models refined together, the labels, the figures."""
-        return fit_result(self._stream.result(), self._points.shape, self._points.copied)
+        return fit_result(self._stream.result(), self._points.shape, self._points.copied, self._told)
 
     def __enter__(self) -> ModelStream:
         return self
@@ -164,16 +166,17 @@ class ModelStream:
 class Fitter:
     """Holds a back end; reuse it over frames, one a thread.
 
-    fitter = swarmfit.Fitter(model="plane", threshold=0.02)
-    models = []
-    for frame in frames:                     # H x W x 3 or N x 3
-        result = fitter.fit(frame, warm_start=models)
-        models = result.models
+        fitter = swarmfit.Fitter(model="plane", threshold=0.02)
+        models = []
+        for frame in frames:                     # H x W x 3 or N x 3
+            result = fitter.fit(frame, warm_start=models)
+            models = result.models
     """
 
     def __init__(self, model: str = "plane", threshold: SupportsFloat | str | None = None, **options: Unpack[FitterOptions]) -> None:
         self._model = model
         self._dimension = _core.dimension(model)
+        self._options = {"threshold": threshold, **options}
         self._fitter = _core.Fitter(model=model, threshold=threshold, **options)
 
     @property
@@ -182,17 +185,26 @@ class Fitter:
         return self._fitter.backend
 
     def fit(
-        self, points: Any, *, on_model: Callable[[Model], object] | None = None, warm_start: Sequence[Model] = ()
+        self,
+        points: Any,
+        *,
+        on_model: Callable[[Model], object] | None = None,
+        warm_start: Sequence[Model] = (),
+        record_search: bool = False,
     ) -> FitResult:
         """Fits all models; `warm_start`: those of an earlier fit, to seed the swarm. See swarmfit.fit."""
         taken = points_of(points, self._dimension)
-        result = self._fitter.fit(taken.rows, on_model, list(warm_start))
-        return fit_result(result, taken.shape, taken.copied)
+        told = self._tell(record_search)
+        result = self._fitter.fit(taken.rows, on_model, list(warm_start), told.search)
+        return fit_result(result, taken.shape, taken.copied, told)
 
     def find_models(self, points: Any, *, warm_start: Sequence[Model] = ()) -> ModelStream:
         """Iterates over models as they are found; the Fitter is at work until that ends. See swarmfit.find_models."""
         taken = points_of(points, self._dimension)
-        return ModelStream(self._fitter.find_models(taken.rows, list(warm_start)), taken)
+        return ModelStream(self._fitter.find_models(taken.rows, list(warm_start)), taken, self._tell(False))
+
+    def _tell(self, record_search: bool) -> Told:
+        return Told("fit", f"points, {self._model!r}", self._options, record_search, self._dimension)
 
     def __repr__(self) -> str:
         return f"Fitter({self._model!r} on {self.backend[0]})"
@@ -206,6 +218,7 @@ def fit(
     *,
     on_model: Callable[[Model], object] | None = None,
     warm_start: Sequence[Model] = (),
+    record_search: bool = False,
     **options: Unpack[FitterOptions],
 ) -> FitResult:
     """Finds all models of one kind.
@@ -214,11 +227,12 @@ def fit(
         points: N x D or H x W x D, a structured array with fields x, y, z, a Cloud, an Open3D point cloud; see swarmfit's own docstring.
         on_model: told of each model the moment it is found; returns False to stop with what there is.
         warm_start: models of an earlier fit, to seed the swarm.
+        record_search: keeps what the swarms did, for report() to replay; the result is the same, and takes a little longer.
 
     Returns:
         A FitResult: models; labels, N or H x W of uint16, 0 none and k for models[k - 1], in the input's order; stats.
     """
-    return Fitter(model, threshold, **options).fit(points, on_model=on_model, warm_start=warm_start)
+    return Fitter(model, threshold, **options).fit(points, on_model=on_model, warm_start=warm_start, record_search=record_search)
 
 
 @_documented(_FIT_OPTIONS)
@@ -232,9 +246,9 @@ def find_models(
 ) -> ModelStream:
     """Iterates over models of one kind as they are found.
 
-    for plane in swarmfit.find_models(cloud, threshold=0.02):
-        if is_table(plane):
-            break
+        for plane in swarmfit.find_models(cloud, threshold=0.02):
+            if is_table(plane):
+                break
 
     Points as in fit(). The models are those of the search; result() waits for its end and has them refined together, with labels.
     """
@@ -246,6 +260,7 @@ class Perceiver:
     """Holds the back end, the gallery and the vertical of the first view; reuse it over frames, one a thread."""
 
     def __init__(self, **options: Unpack[PerceiverOptions]) -> None:
+        self._options = dict(options)
         self._perceiver = _core.Perceiver(**options)
 
     def perceive(
@@ -256,19 +271,28 @@ class Perceiver:
         *,
         depth_scale: float | None = None,
         on_plane: Callable[[Model], object] | None = None,
+        record_search: bool = False,
     ) -> PerceiveResult:
         """One coloured depth frame. See swarmfit.perceive."""
-        return self._look(frame_of(color, depth, intrinsics, depth_scale), True, on_plane)
+        told = Told("perceive", "color, depth, intrinsics", self._options, record_search)
+        return self._look(frame_of(color, depth, intrinsics, depth_scale), True, on_plane, told)
 
     def perceive_cloud(
-        self, points: Any, color: Any = None, *, intrinsics: Any = None, on_plane: Callable[[Model], object] | None = None
+        self,
+        points: Any,
+        color: Any = None,
+        *,
+        intrinsics: Any = None,
+        on_plane: Callable[[Model], object] | None = None,
+        record_search: bool = False,
     ) -> PerceiveResult:
         """One cloud. See swarmfit.perceive_cloud."""
         cloud = cloud_of(points, color, intrinsics)
-        return self._look(cloud, cloud is not points, on_plane)
+        told = Told("perceive_cloud", "points", self._options, record_search)
+        return self._look(cloud, cloud is not points, on_plane, told)
 
-    def _look(self, cloud: Cloud, copied: bool, on_plane: Callable[[Model], object] | None) -> PerceiveResult:
-        return perceive_result(self._perceiver.perceive(cloud, on_plane), cloud, copied)
+    def _look(self, cloud: Cloud, copied: bool, on_plane: Callable[[Model], object] | None, told: Told) -> PerceiveResult:
+        return perceive_result(self._perceiver.perceive(cloud, on_plane, told.search), cloud, copied, told)
 
 
 @_documented(_PERCEIVE_OPTIONS)
@@ -279,6 +303,7 @@ def perceive(
     *,
     depth_scale: float | None = None,
     on_plane: Callable[[Model], object] | None = None,
+    record_search: bool = False,
     **options: Unpack[PerceiverOptions],
 ) -> PerceiveResult:
     """A coloured depth frame to supporting planes, what stands on them, its outline, its name.
@@ -289,8 +314,11 @@ def perceive(
         intrinsics: fx, fy, cx, cy [px]; or a 3 x 3 camera matrix; or Open3D's PinholeCameraIntrinsic; or a ROS CameraInfo.
         depth_scale: metres a unit of depth; default 0.001 for whole numbers, 1 for floats.
         on_plane: told of each plane the moment it is found; returns False to stop with what there is.
+        record_search: keeps what the swarms did, for report() to replay; the result is the same, and takes a little longer.
     """
-    return Perceiver(**options).perceive(color, depth, intrinsics, depth_scale=depth_scale, on_plane=on_plane)
+    return Perceiver(**options).perceive(
+        color, depth, intrinsics, depth_scale=depth_scale, on_plane=on_plane, record_search=record_search
+    )
 
 
 @_documented(_PERCEIVE_OPTIONS)
@@ -300,6 +328,7 @@ def perceive_cloud(
     *,
     intrinsics: Any = None,
     on_plane: Callable[[Model], object] | None = None,
+    record_search: bool = False,
     **options: Unpack[PerceiverOptions],
 ) -> PerceiveResult:
     """A cloud to supporting planes and what stands on them; with an image grid and colours to outlines and names, too.
@@ -309,7 +338,9 @@ def perceive_cloud(
         color: of the same shape, uint8, red first; default: the cloud's own.
         intrinsics: of the camera behind the grid, where known; as in perceive().
     """
-    return Perceiver(**options).perceive_cloud(points, color, intrinsics=intrinsics, on_plane=on_plane)
+    return Perceiver(**options).perceive_cloud(
+        points, color, intrinsics=intrinsics, on_plane=on_plane, record_search=record_search
+    )
 
 
 def devices() -> list[Device]:
@@ -371,6 +402,10 @@ def read_stereo(
     return _core.read_stereo(left, right, calib)
 
 
-def make_room_scene(seed: int = 1, width: int = 640, height: int = 480) -> Cloud:
-    """The built-in scene: a loaded shelf and table on a floor before a wall, as a depth camera sees them."""
-    return _core.make_room_scene(seed, width, height)
+def make_room_scene(seed: int = 1, width: int = 640, height: int = 480, *, frame: int = 0, frames: int = 1) -> Cloud:
+    """The built-in scene: a loaded shelf and table on a floor before a wall, as a depth camera sees them.
+
+    Args:
+        frame, frames: the view from place `frame` of `frames` on a walk before the table, at walking pace for 300.
+    """
+    return _core.make_room_scene(seed, width, height, frame, frames)

@@ -76,6 +76,9 @@ class Model:
     def supporting(self) -> bool:
         """Set by perception: horizontal, and of reasonable size."""
     @property
+    def id(self) -> int:
+        """With `track`: 1, 2 ..., the same plane over frames, never given twice; else 0."""
+    @property
     def iterations(self) -> int: ...
     @property
     def evaluations(self) -> int: ...
@@ -123,7 +126,24 @@ def read_cloud(file: _Path) -> Cloud: ...
 def read_depth(depth: _Path, intrinsics: _Camera, depth_scale: float = 0.001) -> Cloud: ...
 def read_rgbd(color: _Path, depth: _Path, intrinsics: _Camera, depth_scale: float = 0.001) -> Cloud: ...
 def read_stereo(left: _Path, right: _Path, calib: _Path) -> Cloud: ...
-def make_room_scene(seed: int = 1, width: int = 640, height: int = 480) -> Cloud: ...
+def make_room_scene(seed: int = 1, width: int = 640, height: int = 480, frame: int = 0, frames: int = 1) -> Cloud: ...
+
+class SearchRecord:
+    """A search to be replayed in a report."""
+
+    def __init__(self) -> None: ...
+
+_Settings = Sequence[tuple[str, str, bool]]
+
+def check_report() -> None:
+    """Raises CannotWrite, and says why, where this build cannot write reports."""
+
+def write_fit_report(
+    file: _Path, result: FitResult, cloud: Cloud, search: SearchRecord, title: str, call: str, settings: _Settings
+) -> None: ...
+def write_perceive_report(
+    file: _Path, result: PerceiveResult, cloud: Cloud, search: SearchRecord, title: str, call: str, settings: _Settings
+) -> None: ...
 
 class FitResult:
     @property
@@ -147,6 +167,7 @@ class Fitter:
         points: NDArray[Any],
         on_model: Callable[[Model], object] | None = None,
         warm_start: Sequence[Model] = [],
+        record: SearchRecord | None = None,
     ) -> FitResult: ...
     def find_models(self, points: NDArray[Any], warm_start: Sequence[Model] = []) -> ModelStream: ...
     @property
@@ -166,6 +187,9 @@ class SpaceOfInterest:
     @property
     def plane(self) -> int:
         """It stands on models[plane - 1]."""
+    @property
+    def id(self) -> int:
+        """With `track`: 1, 2 ..., the same thing over frames, never given twice; else 0."""
     @property
     def bbox(self) -> tuple[int, int, int, int]:
         """x, y, width, height [px]; zeros without an image grid."""
@@ -198,7 +222,9 @@ class PerceiveResult:
 
 class Perceiver:
     def __init__(self, **options: Any) -> None: ...
-    def perceive(self, cloud: Cloud, on_plane: Callable[[Model], object] | None = None) -> PerceiveResult: ...
+    def perceive(
+        self, cloud: Cloud, on_plane: Callable[[Model], object] | None = None, record: SearchRecord | None = None
+    ) -> PerceiveResult: ...
 
 class Device:
     """One way to evaluate on this machine."""

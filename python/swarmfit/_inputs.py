@@ -129,7 +129,7 @@ def frame_of(color: Any, depth: Any, intrinsics: Any, depth_scale: float | None)
     return _core.cloud_from_depth(z, camera_of(intrinsics), scale, None if color is None else colour_of(color))
 
 
-def cloud_of(points: Any, color: Any, intrinsics: Any) -> _core.Cloud:
+def cloud_of(points: Any, color: Any, intrinsics: Any, dimension: int = 3) -> _core.Cloud:
     """A cloud of ours as it is, anything else copied into one."""
     if isinstance(points, _core.Cloud) and color is None and intrinsics is None:
         return points
@@ -140,7 +140,7 @@ def cloud_of(points: Any, color: Any, intrinsics: Any) -> _core.Cloud:
             color = np.rint(np.asarray(points.colors) * 255).astype(np.uint8)
     if intrinsics is None and isinstance(points, _core.Cloud):
         intrinsics = points.intrinsics
-    rows, shape, _ = points_of(points, 3)
+    rows, shape, _ = points_of(points, dimension)
     rgb = None
     if color is not None:
         rgb = np.asarray(color)

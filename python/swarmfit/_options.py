@@ -44,5 +44,6 @@ if TYPE_CHECKING:
         uncertain_cost: SupportsFloat | None
         smoothness: SupportsFloat | None
         gallery: str | os.PathLike[str] | None
+        track: bool | None
 
     __all__ = ["FitterOptions", "PerceiverOptions", "Unpack"]

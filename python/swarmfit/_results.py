@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from . import _core
+from ._inputs import cloud_of
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
 
     import numpy as np
     from numpy.typing import NDArray
@@ -32,6 +34,23 @@ class Stats:
     copied: bool = False  #: the input had to be copied or converted before it could be looked at
 
 
+class Told:
+    """What a report tells of how a result came about: the call, its options, and the search where it was recorded."""
+
+    def __init__(self, function: str, taken: str, options: Mapping[str, Any], record_search: bool, dimension: int = 3) -> None:
+        self.title = function
+        self.dimension = dimension  #: columns of a point
+        self.options = {name: value for name, value in options.items() if value is not None}
+        given = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
+        self.call = f"swarmfit.{function}({taken}{', ' if given else ''}{given})"
+        self.search = _core.SearchRecord() if record_search else None
+
+    def arguments(self) -> tuple[_core.SearchRecord, str, str, list[tuple[str, str, bool]]]:
+        """Of the compiled half's write_..._report, behind file, result and cloud."""
+        settings = [(name, str(value), True) for name, value in self.options.items()]
+        return self.search or _core.SearchRecord(), self.title, self.call, settings
+
+
 @dataclass(frozen=True)
 class FitResult:
     """All models found in a cloud, in the order found."""
@@ -39,10 +58,27 @@ class FitResult:
     models: list[_core.Model]
     labels: NDArray[np.uint16]  #: the input's shape without its last axis: 0 none, k for models[k - 1]
     stats: Stats
-    _brief: str = field(repr=False, default="")
+    _core: Any = field(repr=False, compare=False, default=None)
+    _told: Any = field(repr=False, compare=False, default=None)
 
     def __str__(self) -> str:
-        return self._brief
+        return self._core.brief()  # type: ignore[no-any-return]
+
+    def report(self, file: str | os.PathLike[str], points: Any, *, color: Any = None) -> None:
+        """One HTML page to look at, as the command's --report writes it; the search is replayed if the fit was told `record_search=True`.
+
+        Args:
+            points: those of the fit. They are copied.
+            color: of the points' shape, uint8, red first; default: the cloud's own.
+
+        Raises:
+            CannotWrite: the file cannot be written, or this build cannot write reports.
+        """
+        _core.check_report()
+        cloud = cloud_of(points, color, None, self._told.dimension)
+        if len(cloud) != self.labels.size:
+            raise _core.BadInput(f"points are {len(cloud)}, must be the {self.labels.size} of the fit")
+        _core.write_fit_report(file, self._core, cloud, *self._told.arguments())
 
 
 @dataclass(frozen=True)
@@ -60,6 +96,7 @@ class PerceiveResult:
     timing_ms: dict[str, float]
     cloud: _core.Cloud = field(repr=False)  #: what was looked at
     _core: Any = field(repr=False, compare=False, default=None)
+    _told: Any = field(repr=False, compare=False, default=None)
 
     def overlay(self) -> NDArray[np.uint8]:
         """H x W x 3, red first: planes in their colours, what sticks out in yellow, outlines, names."""
@@ -69,16 +106,25 @@ class PerceiveResult:
         """The text of result.json, as the command writes it."""
         return self._core.to_json(self.cloud)  # type: ignore[no-any-return]
 
+    def report(self, file: str | os.PathLike[str]) -> None:
+        """One HTML page to look at, as the command's --report writes it; the search is replayed if perceive() was told
+        `record_search=True`.
+
+        Raises:
+            CannotWrite: the file cannot be written, or this build cannot write reports.
+        """
+        _core.write_perceive_report(file, self._core, self.cloud, *self._told.arguments())
+
     def write(self, folder: str | os.PathLike[str]) -> None:
         """result.json, planes.png, popout.png, objects.png, overlay.png; or labelled.ply for a cloud without an image grid."""
         self._core.write(folder, self.cloud)
 
 
-def fit_result(result: _core.FitResult, shape: tuple[int, ...], copied: bool) -> FitResult:
-    return FitResult(result.models, result.labels.reshape(shape), Stats(**result.figures, copied=copied), result.brief())
+def fit_result(result: _core.FitResult, shape: tuple[int, ...], copied: bool, told: Told) -> FitResult:
+    return FitResult(result.models, result.labels.reshape(shape), Stats(**result.figures, copied=copied), result, told)
 
 
-def perceive_result(result: _core.PerceiveResult, cloud: _core.Cloud, copied: bool) -> PerceiveResult:
+def perceive_result(result: _core.PerceiveResult, cloud: _core.Cloud, copied: bool, told: Told) -> PerceiveResult:
     shape = (cloud.height, cloud.width) if cloud.organised else (len(cloud),)
     objects = result.objects
     return PerceiveResult(
@@ -93,4 +139,5 @@ def perceive_result(result: _core.PerceiveResult, cloud: _core.Cloud, copied: bo
         timing_ms=result.timing_ms,
         cloud=cloud,
         _core=result,
+        _told=told,
     )
