@@ -25,6 +25,8 @@ python_environment() {
   if { python3 -m venv --clear "$folder" && "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${wanted[@]}"; } \
       >"$root/build/python-environment.log" 2>&1; then
     echo "${wanted[*]}" >"$folder/installed"
+    # Large, and only for the tests of swarmfit.rerun, which say so where it is absent.
+    "$folder/bin/python" -m pip install --quiet --disable-pip-version-check rerun-sdk >>"$root/build/python-environment.log" 2>&1 || true
   else
     echo "the Python package is left out: $(tail -n 1 "$root/build/python-environment.log")" >&2
     return 1

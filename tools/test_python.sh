@@ -25,6 +25,7 @@ if command -v ccache >/dev/null; then export CMAKE_ARGS="-DCMAKE_CXX_COMPILER_LA
 say "pip install . ($("$python" --version))"
 "$python" -m venv "$environment"
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check ".[test]"
+"$environment/bin/python" -m pip install --quiet --disable-pip-version-check rerun-sdk || echo "no rerun-sdk: its tests will be skipped"
 "$environment/bin/python" -m pip list --disable-pip-version-check | grep -E '^(swarmfit|numpy|pytest|mypy) '
 
 # From elsewhere: what is imported is what was installed.

@@ -75,7 +75,8 @@ def hull_on_plane(points: NDArray[Any], plane: _core.Model) -> NDArray[np.float6
     turns = np.linspace(0, 2 * np.pi, _DIRECTIONS, endpoint=False)
     farthest = [int(np.argmax(flat @ (np.cos(turn), np.sin(turn)))) for turn in turns]
     around = list(dict.fromkeys(farthest))  # each once, in the order of the directions
-    return flat[around] @ axes - plane.offset * normal
+    corners: NDArray[np.float64] = flat[around] @ axes - plane.offset * normal
+    return corners
 
 
 class _Log:
