@@ -7,6 +7,7 @@ is not there is an error. The pages of the API are written beside them, one a he
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import shutil
@@ -93,8 +94,14 @@ def write_cpp_pages(root: Path, out: Path) -> None:
     (out / "api/cpp/index.rst").write_text(index + ".. toctree::\n   :hidden:\n\n" + "".join(entries))
 
 
-def write_python_page(root: Path, out: Path) -> None:
-    shutil.copy(root / "docs/site/python.rst", out / "api/python.rst")
+def write_python_page(root: Path, out: Path) -> list[str]:
+    """Copies the page; names that the package exports and the page does not show are errors."""
+    page = root / "docs/site/python.rst"
+    shutil.copy(page, out / "api/python.rst")
+    shown = set(re.findall(r"^\.\. auto\w+:: (\w+)$", page.read_text(), re.M)) | {"__version__"}
+    tree = ast.parse((root / "python/swarmfit/__init__.py").read_text())
+    exported = next(ast.literal_eval(n.value) for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__")
+    return [f"docs/site/python.rst does not show {name}" for name in sorted(set(exported) - shown)]
 
 
 def main() -> int:
@@ -107,7 +114,7 @@ def main() -> int:
     for page in copier.pages:
         copier.copy(page)
     write_cpp_pages(root, out)
-    write_python_page(root, out)
+    copier.errors += write_python_page(root, out)
     (build / "shown.json").write_text(json.dumps(sorted(copier.shown)))
     for error in copier.errors:
         print(error, file=sys.stderr)
