@@ -14,6 +14,7 @@
 #include <swarmfit/report.hpp>
 #include <swarmfit/scene.hpp>
 
+#include "host/report/cost_maps.hpp"
 #include "host/report/encode.hpp"
 #include "host/report/search_json.hpp"
 
@@ -219,6 +220,40 @@ TEST(Observer, OfAPerceiverIsToldOfPlanesInTheFrameOfTheCloud) {
     });
     EXPECT_TRUE(near) << plane.parameters.transpose();
   }
+}
+
+TEST(CostMaps, ThingsCostLessAsObjectThanAsBackgroundAndTheRestIsNotLookedAt) {
+  const Scene scene = make_room_scene(1, 320, 240);
+  PerceiveOptions options;
+  options.fit.backend = "cpu";
+  auto perceiver = Perceiver::create(options);
+  ASSERT_TRUE(perceiver) << perceiver.error().message;
+  const auto seen = perceiver->perceive(scene.cloud);
+  ASSERT_TRUE(seen) << seen.error().message;
+  const report::CostMaps maps = report::cost_maps(*seen, scene.cloud);
+  ASSERT_EQ(maps.object.size(), cv::Size(320, 240));
+  ASSERT_EQ(maps.background.size(), maps.object.size());
+  double object = 0, background = 0;
+  std::size_t on_things = 0, outside = 0;
+  for (std::size_t i = 0; i < seen->popout.size(); ++i) {
+    const int v = static_cast<int>(i) / 320, u = static_cast<int>(i) % 320;
+    EXPECT_EQ(maps.object(v, u) == 0, maps.background(v, u) == 0);
+    if (seen->popout[i] > 0) {
+      EXPECT_GT(maps.object(v, u), 0);
+      ++on_things;
+      object += maps.object(v, u);
+      background += maps.background(v, u);
+    } else if (maps.object(v, u) == 0) {
+      ++outside;
+    }
+  }
+  EXPECT_LT(object, background);
+  EXPECT_GT(on_things, 1000U);
+  EXPECT_GT(outside, 10000U);
+
+  Cloud grey = scene.cloud;
+  grey.rgb.clear();
+  EXPECT_TRUE(report::cost_maps(*seen, grey).object.empty());
 }
 
 TEST(ReportPage, HoldsItsDataAndNothingThatACloudsNameCouldEnd) {

@@ -18,6 +18,7 @@
 
 #include "host/io/ground_image.hpp"
 #include "host/io/palette.hpp"
+#include "host/report/cost_maps.hpp"
 #include "host/report/encode.hpp"
 #include "host/report/search_json.hpp"
 #ifdef SWARMFIT_REPORT_PAGE
@@ -93,6 +94,15 @@ std::vector<std::uint16_t> coarser(const std::vector<std::uint16_t>& labels, con
   return some;
 }
 
+/// One in `every` pixels and rows, without loss.
+Bytes png(const cv::Mat1b& levels, int every, cv::Size size) {
+  cv::Mat shown = levels;
+  if (every > 1) cv::resize(levels, shown, size, 0, 0, cv::INTER_NEAREST);
+  Bytes bytes;
+  cv::imencode(".png", shown, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
+  return bytes;
+}
+
 json add_image(Parts& parts, const Cloud& input, const std::vector<std::uint16_t>& planes, const PerceiveResult* perceived) {
   const int every = (input.width + kWidestImage - 1) / kWidestImage;
   const int width = (input.width + every - 1) / every, height = (input.height + every - 1) / every;
@@ -106,6 +116,10 @@ json add_image(Parts& parts, const Cloud& input, const std::vector<std::uint16_t
   if (perceived != nullptr) {
     parts.add("image-popout", report::runs(coarser(perceived->popout, input, every)));
     parts.add("image-objects", report::runs(coarser(perceived->objects, input, every)));
+    if (const report::CostMaps costs = report::cost_maps(*perceived, input); !costs.object.empty()) {
+      parts.add("image-cost-object", png(costs.object, every, {width, height}));
+      parts.add("image-cost-background", png(costs.background, every, {width, height}));
+    }
   }
   return {{"width", width}, {"height", height}, {"every", every}, {"coloured", input.coloured()}};
 }

@@ -79,17 +79,25 @@ function readCloud(about) {
   };
 }
 
+/** A picture that the page brings along, not yet decoded; undefined where it has none. */
+function picture(id, kind) {
+  const encoded = text(id);
+  if (!encoded) return undefined;
+  const source = new Image();
+  source.src = `data:image/${kind};base64,${encoded}`;
+  return source;
+}
+
 function readImage(about) {
   if (!about.image) return undefined;
   const count = about.image.width * about.image.height;
-  const source = new Image();
-  source.src = 'data:image/jpeg;base64,' + text('image-jpeg');
   return {
     ...about.image,
-    source,
+    source: picture('image-jpeg', 'jpeg'),
     planes: readRuns(bytes('image-planes'), count),
     popout: readRuns(bytes('image-popout'), count),
     objects: readRuns(bytes('image-objects'), count),
+    costs: {object: picture('image-cost-object', 'png'), background: picture('image-cost-background', 'png')},
   };
 }
 

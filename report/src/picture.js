@@ -1,5 +1,5 @@
 // The camera's image and what is drawn on it.
-import {css, modelColour, objectColour} from './colours.js';
+import {css, modelColour, objectColour, ramp} from './colours.js';
 import {$, choices, slider} from './dom.js';
 import {distanceColour} from './paint.js';
 
@@ -15,6 +15,7 @@ export class Picture {
     this.pointAt = this.pointsOfPixels();
     $('image-part').hidden = false;
     this.controls();
+    this.costs = {};
     this.image.source.decode().then(() => this.draw());
     this.canvas.addEventListener('pointermove', (event) => this.hover(event));
     this.canvas.addEventListener('pointerleave', () => this.hover());
@@ -24,10 +25,11 @@ export class Picture {
     const bar = $('image-toolbar'), perceived = this.page.about.kind === 'perceive';
     const options = [['all', perceived ? 'Planes and things' : 'Models']];
     if (perceived) options.push(['planes', 'Planes'], ['popout', 'What sticks out'], ['objects', 'Outlines']);
+    if (this.image.costs.object) options.push(['cost-object', 'Cost as object'], ['cost-background', 'Cost as background']);
     options.push(['distance', 'Distance'], ['none', this.image.coloured ? 'Photo' : 'Depth']);
     choices(bar, 'What is drawn on the image', options, this.by, (value) => {
       this.by = value;
-      this.draw();
+      this.readCosts(value.replace('cost-', '')).then(() => this.draw());
     });
     slider(bar, 'strength', {min: 0.15, max: 1, step: 0.05, value: this.strength}, (value) => {
       this.strength = value;
@@ -47,6 +49,22 @@ export class Picture {
     return at;
   }
 
+  /** The levels of a map of costs, read when it is first looked at: 0 none, 1 a cost of 0, 255 a cost of 1. */
+  async readCosts(label) {
+    const source = this.image.costs[label], {width, height} = this.image;
+    if (!source || this.costs[label]) return;
+    await source.decode();
+    const context = new OffscreenCanvas(width, height).getContext('2d');
+    context.drawImage(source, 0, 0, width, height);
+    this.costs[label] = context.getImageData(0, 0, width, height).data.filter((_, k) => k % 4 === 0);
+  }
+
+  /** What costs little is strong. */
+  costColour(label, pixel) {
+    const level = this.costs[label]?.[pixel] ?? 0;
+    return level > 0 ? ramp(1 - (level - 1) / 254) : undefined;
+  }
+
   colourAt(pixel) {
     const {planes, popout, objects} = this.image;
     const of = (labels, colour) => (labels && labels[pixel] > 0 && labels[pixel] !== uncertain ? colour(labels[pixel]) : undefined);
@@ -55,6 +73,8 @@ export class Picture {
       case 'popout': return of(popout, objectColour);
       case 'objects': return objects?.[pixel] === uncertain ? [255, 255, 255] : of(objects, objectColour);
       case 'distance': return this.pointAt[pixel] < 0 ? undefined : distanceColour(this.distances()[this.pointAt[pixel]], this.page.result.threshold);
+      case 'cost-object': return this.costColour('object', pixel);
+      case 'cost-background': return this.costColour('background', pixel);
       case 'all': return of(objects ?? popout, objectColour) ?? of(planes, modelColour);
       default: return undefined;
     }
@@ -65,7 +85,7 @@ export class Picture {
     context.drawImage(this.image.source, 0, 0, width, height);
     if (this.by !== 'none') this.tint(context, width, height);
     if (this.by === 'all' || this.by === 'objects') this.outlines(context, width, height);
-    if (this.page.about.kind === 'perceive' && this.by !== 'none' && this.by !== 'distance') this.boxes(context);
+    if (this.page.about.kind === 'perceive' && this.by !== 'none' && this.by !== 'distance' && !this.by.startsWith('cost')) this.boxes(context);
     if (this.marked >= 0) this.ring(context);
   }
 

@@ -139,9 +139,17 @@ class Visit {
       await frames(page);
       this.expect(/^\d+, \d+: /.test(await page.locator('#image-note').textContent()), 'nothing is told of the pixel under the pointer');
     }
-    for (const choice of await page.locator('#image-toolbar [data-choice]').all()) {
+    const choices = await page.locator('#image-toolbar [data-choice]').all();
+    const names = await Promise.all(choices.map((choice) => choice.getAttribute('data-choice')));
+    this.expect(!this.what.things || names.includes('cost-object'), 'there are no maps of costs');
+    const drawn = () => page.locator('#image').evaluate((canvas) => canvas.toDataURL());
+    const plain = names.includes('none') && (await page.locator('#image-toolbar [data-choice="none"]').click(), await frames(page), await drawn());
+    for (const choice of choices) {
       await choice.click();
       await frames(page);
+      if ((await choice.getAttribute('data-choice')).startsWith('cost-')) {
+        await page.waitForFunction((was) => document.getElementById('image').toDataURL() !== was, plain, {timeout: 30000});
+      }
       await this.shoot(`image-${await choice.getAttribute('data-choice')}`);
     }
     await page.locator('#image-toolbar [data-choice="all"]').click();
