@@ -21,7 +21,7 @@ for kind in static shared; do
   folder=$root/build/$kind
   cmake -S . -B "$folder" -G Ninja -DCMAKE_BUILD_TYPE=Release -DBUILD_SHARED_LIBS=$([ $kind = shared ] && echo ON || echo OFF) \
     -DSWARMFIT_BUILD_SAMPLES=OFF "${launcher[@]}" "$@" >"$folder-configure.log" 2>&1 || { cat "$folder-configure.log" >&2; exit 1; }
-  cmake --build "$folder" --target swarmfit swarmfit_cli
+  cmake --build "$folder" --target swarmfit swarmfit_cli swarmfit_terminal_files
   ctest --test-dir "$folder" -R '^install\.' --output-on-failure --no-tests=error
 done
 
@@ -31,6 +31,9 @@ rm -rf build/shared/packages build/shared/unpacked
 package=$(ls build/shared/packages/*.deb)
 dpkg-deb --info "$package"
 dpkg-deb --contents "$package" | awk '{print $1, $3, $6, $7, $8}'
+for file in bin/swarmfit include/swarmfit/swarmfit.hpp lib/libswarmfit.so share/man/man1/swarmfit.1 share/bash-completion/completions/swarmfit; do
+  dpkg-deb --contents "$package" | grep -q " \./usr/$file" || { echo "the package lacks /usr/$file" >&2; exit 1; }
+done
 dpkg-deb --extract "$package" build/shared/unpacked
 prefix=$root/build/shared/unpacked/usr
 libraries=$(dirname "$(find "$prefix" -name libswarmfit.so)")

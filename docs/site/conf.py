@@ -58,6 +58,8 @@ napoleon_numpy_docstring = False
 napoleon_custom_sections = [("Options", "params_style")]
 
 html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_title = f"Swarmfit {release}"
 html_show_sphinx = False
 html_copy_source = False

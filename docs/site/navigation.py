@@ -12,7 +12,7 @@ SECTIONS: dict[str, list[str]] = {
     "How to": ["from_pcl", "from_open3d", "on_a_gpu", "without_a_gpu", "tuning", "own_models", "rerun", "report", "embedding"],
     "Reference": ["api/cpp/index", "api/python", "performance"],
     "How it works": ["method", "fitting", "perception", "backends", "architecture"],
-    "Project": ["readme", "contributing", "changelog"],
+    "Project": ["Read me <readme>", "contributing", "changelog"],
 }
 
 #: They hold no names, or only macros.

@@ -54,7 +54,7 @@ def rewrite(_app: Sphinx, _what: str, _name: str, _object: Any, _options: Any, l
             code = False
         section = re.match(r"Options, None for the default(; .*)?:$", line)
         if section:
-            out += [f"None is the default{literal(section[1] or '')}.", "", "Options:"]
+            out += [f"Options that are None have their default{literal(section[1] or '')}.", "", "Options:"]
         else:
             out.append(line if code else literal(line))
     lines[:] = out

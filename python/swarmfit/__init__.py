@@ -230,7 +230,7 @@ def fit(
         record_search: keeps what the swarms did, for report() to replay; the result is the same, and takes a little longer.
 
     Returns:
-        A FitResult: models; labels, N or H x W of uint16, 0 none and k for models[k - 1], in the input's order; stats.
+        Models, labels and stats. Labels are N or H x W of uint16, in the input's order, with 0 for none and k for models[k - 1].
     """
     return Fitter(model, threshold, **options).fit(points, on_model=on_model, warm_start=warm_start, record_search=record_search)
 
