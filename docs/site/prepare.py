@@ -78,7 +78,7 @@ def plain(text: str) -> str:
 def write_cpp_pages(root: Path, out: Path) -> None:
     folder = root / "host/include/swarmfit"
     headers = sorted(folder.glob("*.hpp")) + sorted(folder.glob("adapters/*.hpp"))
-    index = title("C++") + "Made from the comments in the installed headers. ``#include <swarmfit/swarmfit.hpp>`` brings all but the adapters.\n\n"
+    index = title("C++") + "Made from the comments in the installed headers. ``swarmfit/swarmfit.hpp`` includes all but the adapters.\n\n"
     entries = []
     (out / "api/cpp/adapters").mkdir(parents=True, exist_ok=True)
     for header in headers:

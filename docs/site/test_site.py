@@ -40,7 +40,8 @@ class Preparing(unittest.TestCase):
         )
         self.assertEqual(
             text,
-            "[o](other.md#x) [r](readme.md) [a](source:kernels/a.hpp) [k](source:kernels) ![p](images/p.png) [w](https://a.b/c) [h](#here)\n",
+            "[o](other.md#x) [r](readme.md) [a](source:kernels/a.hpp) [k](source:kernels) ![p](images/p.png) "
+            "[w](https://a.b/c) [h](#here)\n",
         )
         self.assertEqual(copier.shown, {"kernels/a.hpp", "kernels"})
         self.assertEqual(copier.errors, [])

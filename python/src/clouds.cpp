@@ -165,7 +165,8 @@ void bind_clouds(nb::module_& module) {
       [](std::uint64_t seed, int width, int height, std::size_t frame, std::size_t frames) {
         if (width < 1 || height < 1) raise({Error::Kind::invalid_option, "width and height must be >= 1 [px]"});
         if (frame >= frames) {
-          raise({Error::Kind::invalid_option, "frame is " + std::to_string(frame) + ", must be less than frames, " + std::to_string(frames)});
+          raise(
+              {Error::Kind::invalid_option, "frame is " + std::to_string(frame) + ", must be less than frames, " + std::to_string(frames)});
         }
         return without_lock([&]() -> Expected<Cloud> { return make_room_scene(seed, width, height, walk_in_room(frame, frames)).cloud; });
       },

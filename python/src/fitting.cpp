@@ -109,8 +109,7 @@ void bind_fitting(nb::module_& module) {
       .def("result", &ModelStream::result, nb::rv_policy::reference_internal);
   nb::class_<Workshop>(module, "Fitter")
       .def(nb::new_([](const nb::kwargs& options) { return make_tool<Fitter>(fit_options(options)); }))
-      .def("fit", &fit_to_end, "points"_a, "on_model"_a = nb::none(), "warm_start"_a = std::vector<Model>(),
-           "record"_a = nb::none())
+      .def("fit", &fit_to_end, "points"_a, "on_model"_a = nb::none(), "warm_start"_a = std::vector<Model>(), "record"_a = nb::none())
       .def(
           "find_models",
           [](std::shared_ptr<Workshop> self, nb::handle points, std::vector<Model> warm_start) {

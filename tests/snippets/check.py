@@ -79,7 +79,8 @@ class Shell:
         camera.chmod(0o755)
         self.path = f"{binaries}:/usr/local/bin:/usr/bin:/bin"
         presets = json.loads((root / "CMakePresets.json").read_text())
-        self.presets = {p["name"] for kind in ("configurePresets", "buildPresets", "testPresets") for p in presets[kind] if not p.get("hidden")}
+        kinds = ("configurePresets", "buildPresets", "testPresets")
+        self.presets = {preset["name"] for kind in kinds for preset in presets[kind] if not preset.get("hidden")}
         self.options = set(re.findall(r"\b(?:option|set)\((\w+)", (root / "CMakeLists.txt").read_text()))
         self.packages = (root / "tools/setup.sh").read_text()
         self.looks: list[tuple[str, Callable[[str], str]]] = [

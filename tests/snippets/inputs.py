@@ -1,5 +1,5 @@
-"""Files under the names that the documentation's examples use: a floor, a table and two boxes before a camera that looks down by 30 degrees,
-and a random-dot stereo pair. Python's own library alone."""
+"""Files under the names that the documentation's examples use: a floor, a table and two boxes before a camera that looks down by 30
+degrees, and a random-dot stereo pair. Python's own library alone."""
 
 from __future__ import annotations
 
