@@ -98,3 +98,24 @@ def test_errors(room: swarmfit.Cloud) -> None:
         swarmfit.Perceiver(segmentation="grabcut")
     with pytest.raises(TypeError, match="unknown option 'model'"):
         swarmfit.Perceiver(model="plane")  # type: ignore[call-arg]
+
+
+def test_tracked_planes_and_things_keep_their_ids() -> None:
+    perceiver = swarmfit.Perceiver(track=True)
+    seen = [perceiver.perceive_cloud(swarmfit.make_room_scene(width=320, height=240, frame=k, frames=300)) for k in range(3)]
+    for kind in ("models", "sois"):
+        ids = [{thing.id for thing in getattr(result, kind)} for result in seen]
+        assert all(0 not in each for each in ids)
+        assert len(ids[0] & ids[1] & ids[2]) >= 3, (kind, ids)
+    alone = swarmfit.perceive_cloud(swarmfit.make_room_scene(width=320, height=240))
+    assert not any(model.id for model in alone.models) and not any(soi.id for soi in alone.sois)
+    with pytest.raises(TypeError, match="track is 1, must be True or False"):
+        swarmfit.Perceiver(track=1)  # type: ignore[arg-type]
+
+
+def test_places_of_the_walk_through_the_room() -> None:
+    first, second = (swarmfit.make_room_scene(width=64, height=48, frame=k, frames=300) for k in range(2))
+    assert np.array_equal(first.points, swarmfit.make_room_scene(width=64, height=48).points, equal_nan=True)
+    assert not np.array_equal(first.points, second.points, equal_nan=True)
+    with pytest.raises(swarmfit.InvalidOption, match="frame is 3, must be less than frames, 3"):
+        swarmfit.make_room_scene(frame=3, frames=3)
