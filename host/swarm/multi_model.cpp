@@ -6,6 +6,7 @@
 
 #include "host/swarm/deflation.hpp"
 #include "host/swarm/labelling.hpp"
+#include "host/swarm/local_labels.hpp"
 #include "host/swarm/noise_model.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
@@ -297,6 +298,9 @@ Expected<> MultiModel::finish(FitResult& result) {
     }
     if (auto done = drop_unpaid(result); !done) return done;
     tell_parameters(result);
+    if (labels_locally()) {
+      if (auto done = share_out_locally(); !done) return done;
+    }
   }
   count_effort(result);
   return {};
@@ -304,6 +308,21 @@ Expected<> MultiModel::finish(FitResult& result) {
 
 void MultiModel::tell_parameters(FitResult& result) const {
   for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
+}
+
+bool MultiModel::labels_locally() const noexcept {
+  return settings_.sharpen && !part_searched_ && points_.finite_count() <= kFewPoints;
+}
+
+Expected<> MultiModel::share_out_locally() {
+  auto distances = measure(ground_, found_);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<float> room;
+  for (std::vector<float>& one : *distances) {
+    if (levelled(one, room).data() == room.data()) one.swap(room);
+  }
+  labels_ = label_locally(points_, *distances, tau_);
+  return {};
 }
 
 bool MultiModel::shares_out() const noexcept { return settings_.joint && !part_searched_ && settings_.prices.smoothness > 0; }

@@ -20,6 +20,9 @@
 
 namespace swarmfit::swarm {
 
+/// With more points, what is gained by looking closer is nothing beside what they say together.
+inline constexpr std::size_t kFewPoints = 2048;
+
 class Labelling;
 class Sampler;
 class Swarm;
@@ -62,7 +65,7 @@ class MultiModel {
   bool shares_points() const noexcept { return asked_ > 1 || !hidden_.empty(); }
   /// Corner of the loss that models of this kind were refined with last, of tau: 0 for the least absolute deviations, 1 for least squares.
   float corner(const models::ModelSpace& of) const noexcept;
-  /// Labels of the points where they were shared out jointly, with an eye to their neighbours; else empty, and the nearest model owns each.
+  /// Labels of the points where they were shared out with an eye to their neighbours; else empty, and the nearest model owns each.
   const std::vector<std::uint16_t>& labels() const noexcept { return labels_; }
 
  private:
@@ -107,6 +110,7 @@ class MultiModel {
   Expected<bool> exchange_one(std::size_t kind, std::span<const std::uint32_t> candidates, std::size_t which, Exchange& best);
   void tell_parameters(FitResult& result) const;
   Expected<> share_out(FitResult& result);
+  Expected<> share_out_locally();
   Expected<> search_further(Labelling& labelling);
   Expected<> drop_unpaid(FitResult& result);
   std::optional<std::string> interrupted() const;
@@ -119,6 +123,8 @@ class MultiModel {
   std::span<const float> levelled(std::span<const float> values, std::vector<float>& room) const;
   bool full() const noexcept { return limits_.max_models > 0 && found_.size() >= limits_.max_models; }
   bool shares_out() const noexcept;
+  /// Are points so few that each is looked at with those about it?
+  bool labels_locally() const noexcept;
   /// Do models of this kind end at the least absolute deviations themselves?
   bool sharpens(const models::ModelSpace& of) const noexcept;
   int full_rounds() const noexcept;  ///< of refinement on all points

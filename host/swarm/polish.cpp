@@ -8,7 +8,6 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr std::size_t kFewPoints = 2048;  // with more, what rounded corners leave of the deviations is nothing beside their own scatter
 constexpr float kOwn = 2;                 // tau: points farther from a model have no say in its last steps
 constexpr int kExchanges = 30;            // of one of the points that a model runs through, at most
 

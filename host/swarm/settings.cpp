@@ -130,7 +130,7 @@ Settings preset(Preset preset) {
   }
   s.particles = 100;
   s.iterations = 100;
-  s.stall = 10;
+  s.stall = 5;  // longer ones find no more: docs/fitting.md
   s.topology = Topology::ring;
   s.local_share = 0.5;
   s.still = 1e-3;
@@ -150,26 +150,26 @@ Settings for_kind(Settings s, ModelType type) {
   s.renewal_share = 0.75;
   s.patience = 2;
   s.prices = type == ModelType::homography ? LabelPrices{0.2, 7} : LabelPrices{0.25, 6};
+  // Samples of seven points are seldom of one body alone: more of them must be seen.
+  if (type == ModelType::fundamental) s.stall = 10;
   return s;
 }
 
 }  // namespace
 
 Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold) {
-  Settings s = preset(options.preset);
+  Settings s = for_kind(preset(options.preset), options.model);
   s.particles = options.particles.value_or(s.particles);
   s.iterations = options.iterations.value_or(s.iterations);
-  // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
-  // Such short swarms miss more, so one more of them may.
-  constexpr int kStallOnPart = 5, kPatienceOnPart = 3;
-  s.stall = options.stall.value_or(s.searches_part(finite_points) ? kStallOnPart : s.stall);
+  s.stall = options.stall.value_or(s.stall);
+  // Of a large cloud a swarm sees a part, and may miss what the whole shows.
+  constexpr int kPatienceOnPart = 3;
   if (s.searches_part(finite_points)) s.patience = kPatienceOnPart;
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
   s.threads = options.threads;
   s.threshold = threshold;
-  s = for_kind(s, options.model);
   const std::size_t fitted = s.fit_points > 0 ? std::min(s.fit_points, finite_points) : finite_points;
   s.stands_for = fitted > 0 ? static_cast<double>(finite_points) / static_cast<double>(fitted) : 1.0;
   // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.

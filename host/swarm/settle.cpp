@@ -41,14 +41,20 @@ Expected<> claim_by_allowance(const Ground& whole, std::span<const kernels::Mode
   return {};
 }
 
-/// Counts and squares of the points that each model owns already.
+/// What the points that each model owns already say of it; its cost is of all points.
 Expected<> weigh_own(const Ground& whole, std::span<const kernels::ModelView> models, std::span<const std::uint16_t> labels,
                      std::span<kernels::Evidence> evidence) {
-  std::vector<float> distances(labels.size() * models.size());
+  std::vector<float> distances(labels.size() * models.size()), own(labels.size());
   if (auto done = whole.evaluator.weigh(whole.view(), {whole.tau, 1, {}}, models, distances, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
   for (std::size_t m = 0; m < models.size(); ++m) {
+    const double cost = evidence[m].cost;
+    for (std::size_t i = 0; i < labels.size(); ++i) own[i] = labels[i] == m + 1 ? whole.allowed_at(i) : 0.0F;
+    const auto done = whole.evaluator.weigh(whole.view(), whole.weighing(own, 1), models.subspan(m, 1), {}, evidence.subspan(m, 1));
+    if (!done) return tl::unexpected(to_error(done.error()));
+    // A label may reach beyond the threshold, where a point has no weight in the moments.
+    evidence[m].cost = cost;
     evidence[m].count = 0;
     evidence[m].square = 0;
     for (std::size_t i = 0; i < labels.size(); ++i) {

@@ -1,0 +1,189 @@
+#include "host/swarm/local_labels.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace swarmfit::swarm {
+namespace {
+
+constexpr float kSlabs = 6;             // each tau wide, on each side of a model: what lies within is along it
+constexpr std::size_t kNear = 16;       // points along the model that tell the densities about one of them
+constexpr double kPrior = 4;            // points' worth of what is known of the model as a whole
+constexpr double kLeastBeside = 0.5;    // no place is so empty that an outlier could not be there
+constexpr double kLeft = 0.5;           // what a point within tau that its model was denied still counts for it
+constexpr double kSigmasPerTau = 2.5;   // 98.8 % of a Gaussian lie within tau
+constexpr int kPasses = 2;              // the second knows which points the first denied
+
+/// The points along one model, in the order of the coordinate in which they spread most.
+class Along {
+ public:
+  Along(const models::WorkingPoints& points, std::span<const float> distances, std::span<const std::uint16_t> nearest, std::uint16_t label,
+        float tau) {
+    for (std::uint32_t i = 0; i < distances.size(); ++i) {
+      const bool within = distances[i] <= kSlabs * tau && (nearest[i] == 0 || nearest[i] == label);
+      if (within) index_.push_back(i);
+    }
+    const int axis = widest(points);
+    std::sort(index_.begin(), index_.end(), [&](std::uint32_t a, std::uint32_t b) {
+      const double at_a = points.at(a, axis), at_b = points.at(b, axis);
+      return at_a < at_b || (at_a == at_b && a < b);
+    });
+    at_.resize(index_.size());
+    for (std::size_t k = 0; k < index_.size(); ++k) {
+      for (int d = 0; d < points.dimension(); ++d) at_[k][static_cast<std::size_t>(d)] = points.at(index_[k], d);
+      std::swap(at_[k][0], at_[k][static_cast<std::size_t>(axis)]);
+    }
+  }
+
+  std::size_t size() const noexcept { return index_.size(); }
+  std::uint32_t point(std::size_t place) const noexcept { return index_[place]; }
+
+  /// Places of the points nearest to that at a place, itself left out; where two are as near, the one that comes first on the walk outwards.
+  std::size_t near(std::size_t place, std::array<std::uint32_t, kNear>& nearest) const {
+    std::array<double, kNear> square{};
+    std::size_t count = 0, below = place, above = place + 1;
+    for (;;) {
+      const double down = below > 0 ? at_[place][0] - at_[below - 1][0] : kNothing;
+      const double up = above < at_.size() ? at_[above][0] - at_[place][0] : kNothing;
+      const double step = std::min(down, up);
+      if (step == kNothing || (count == kNear && step * step >= square[kNear - 1])) return count;
+      const std::size_t other = down <= up ? --below : above++;
+      const double far = apart(place, other);
+      if (count == kNear && far >= square[kNear - 1]) continue;
+      std::size_t slot = count < kNear ? count++ : kNear - 1;
+      for (; slot > 0 && square[slot - 1] > far; --slot) {
+        square[slot] = square[slot - 1];
+        nearest[slot] = nearest[slot - 1];
+      }
+      square[slot] = far;
+      nearest[slot] = static_cast<std::uint32_t>(other);
+    }
+  }
+
+ private:
+  static constexpr double kNothing = std::numeric_limits<double>::infinity();
+  using Coordinates = std::array<double, models::kMaxDimension>;
+
+  int widest(const models::WorkingPoints& points) const {
+    int widest = 0;
+    double most = -1;
+    for (int d = 0; d < points.dimension(); ++d) {
+      double low = kNothing, high = -kNothing;
+      for (const std::uint32_t i : index_) {
+        low = std::min(low, points.at(i, d));
+        high = std::max(high, points.at(i, d));
+      }
+      if (!(high - low > most)) continue;
+      most = high - low;
+      widest = d;
+    }
+    return widest;
+  }
+
+  double apart(std::size_t a, std::size_t b) const {
+    double sum = 0;
+    for (std::size_t d = 0; d < at_[a].size(); ++d) sum += (at_[a][d] - at_[b][d]) * (at_[a][d] - at_[b][d]);
+    return sum;
+  }
+
+  std::vector<std::uint32_t> index_;
+  std::vector<Coordinates> at_;
+};
+
+/// How many times likelier a point at distance d of tau is the model's than an outlier, where `own` points near it are the model's
+/// so far and `beside` are not.
+double odds(double own, double beside, double d) {
+  constexpr double kPeak = 2 * kSigmasPerTau / 2.5066282746310002;  // of half a Gaussian, a slab being 1
+  const double outliers = (beside + kLeastBeside) / static_cast<double>(kSlabs - 1);
+  const double peak = std::max(0.0, own - outliers) * kPeak;
+  return peak * std::exp(-0.5 * kSigmasPerTau * kSigmasPerTau * d * d) / outliers;
+}
+
+std::vector<std::uint16_t> nearest_of(std::span<const std::vector<float>> distances, float tau, std::size_t points) {
+  std::vector<std::uint16_t> labels(points, 0);
+  for (std::size_t i = 0; i < points; ++i) {
+    float least = std::numeric_limits<float>::infinity();
+    for (std::size_t m = 0; m < distances.size(); ++m) {
+      if (!(distances[m][i] <= tau) || !(distances[m][i] < least)) continue;
+      least = distances[m][i];
+      labels[i] = static_cast<std::uint16_t>(m + 1);
+    }
+  }
+  return labels;
+}
+
+/// Which points of a model have more of its own about them than of others', by what each point counts for it.
+class Reach {
+ public:
+  Reach(const models::WorkingPoints& points, std::span<const float> distances, std::span<const std::uint16_t> nearest, std::uint16_t label,
+        float tau)
+      : along_(points, distances, nearest, label, tau), distances_(distances), label_(label), tau_(tau), counts_(along_.size(), 0.0) {
+    for (std::size_t k = 0; k < along_.size(); ++k) {
+      counts_[k] = nearest[along_.point(k)] == label ? 1 : 0;
+      if (distances[along_.point(k)] <= tau) asked_.push_back({static_cast<std::uint32_t>(k), {}, 0});
+    }
+    for (Asked& one : asked_) one.count = along_.near(one.place, one.near);
+  }
+
+  /// Keeps the nearer of two models where both have a claim.
+  void claim(std::span<float> least, std::span<std::uint16_t> labels) const {
+    double all = 0;
+    for (const double one : counts_) all += one;
+    const double share = along_.size() > 0 ? all / static_cast<double>(along_.size()) : 0.0;
+    for (const Asked& one : asked_) {
+      double own = kPrior * share;
+      for (std::size_t k = 0; k < one.count; ++k) own += counts_[one.near[k]];
+      const std::uint32_t point = along_.point(one.place);
+      const double beside = kPrior + static_cast<double>(one.count) - own;
+      if (!(odds(own, beside, static_cast<double>(distances_[point] / tau_)) > 1) || !(distances_[point] < least[point])) continue;
+      least[point] = distances_[point];
+      labels[point] = label_;
+    }
+  }
+
+  void learn(std::span<const std::uint16_t> nearest, std::span<const std::uint16_t> labels) {
+    for (std::size_t k = 0; k < along_.size(); ++k) {
+      const std::uint32_t point = along_.point(k);
+      const double denied = nearest[point] == label_ ? kLeft : 0.0;
+      counts_[k] = labels[point] == label_ ? 1.0 : denied;
+    }
+  }
+
+ private:
+  struct Asked {
+    std::uint32_t place;
+    std::array<std::uint32_t, kNear> near;
+    std::size_t count;
+  };
+
+  Along along_;
+  std::span<const float> distances_;
+  std::uint16_t label_;
+  float tau_;
+  std::vector<double> counts_;  // of the points along the model: 1 for one that is its own
+  std::vector<Asked> asked_;    // those within tau
+};
+
+}  // namespace
+
+std::vector<std::uint16_t> label_locally(const models::WorkingPoints& points, std::span<const std::vector<float>> distances, float tau) {
+  const std::vector<std::uint16_t> nearest = nearest_of(distances, tau, points.size());
+  std::vector<Reach> reaches;
+  reaches.reserve(distances.size());
+  for (std::size_t m = 0; m < distances.size(); ++m) reaches.emplace_back(points, distances[m], nearest, static_cast<std::uint16_t>(m + 1), tau);
+  std::vector<std::uint16_t> labels;
+  std::vector<float> least;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    if (pass > 0) {
+      for (Reach& reach : reaches) reach.learn(nearest, labels);
+    }
+    labels.assign(points.size(), 0);
+    least.assign(points.size(), std::numeric_limits<float>::infinity());
+    for (const Reach& reach : reaches) reach.claim(least, labels);
+  }
+  return labels;
+}
+
+}  // namespace swarmfit::swarm
