@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint32_t kFirstContest = 1U << 31;  // rounds of contests, apart from those of the search
 constexpr double kAlong = 0.8;                     // cosine of the angle between a point's normal and the model's
+constexpr int kBriefStall = 1;                     // still steps that end a swarm on one model's points
 constexpr double kClearly = 1.1;                   // times what a flat model is worth: a curved one must be worth more
 
 /// The caps of those points that a model explains; 0 elsewhere.
@@ -80,7 +81,10 @@ Expected<MultiModel::Outcome> MultiModel::contest(Candidate& winner) {
 Expected<bool> MultiModel::best_on(std::size_t kind, std::span<const float> caps, models::Position& theta, std::vector<float>& distances) {
   const std::size_t steps = steps_;
   if (auto done = show(caps); !done) return tl::unexpected(done.error());
-  Swarm swarm(space(kind), kinds_[kind].settings, random_);
+  // Most of these points are of one model or of two: samples hit it at once, and refinement does the rest.
+  Settings brief = kinds_[kind].settings;
+  brief.stall = std::min(brief.stall, kBriefStall);
+  Swarm swarm(space(kind), brief, random_);
   auto flown = fly(swarm, kind, kFirstContest + contests_++, {}, caps, kUnexplained * tau_);
   if (flown && *flown) {
     theta = swarm.best();

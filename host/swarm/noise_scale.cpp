@@ -7,12 +7,14 @@
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_model.hpp"
+#include "host/swarm/payment.hpp"
 #include "host/swarm/refinement.hpp"
 
 namespace swarmfit::swarm {
 namespace {
 
 constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
+constexpr double kReach = 3;        // thresholds: how far about the models points tell the noise from what surrounds it
 constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
 constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
 constexpr double kSettled = 0.05;   // relative change of the threshold below which it stays
@@ -20,6 +22,7 @@ constexpr double kAlike = 0.25;     // one below which a search would find the s
 constexpr int kFreeSteps = 2;       // of the threshold; further ones go half the way, for it may swing between two models' noise
 constexpr int kRounds = 10;         // of search
 constexpr int kSteps = 10;          // of models and threshold in turn, after each
+constexpr int kStarts = 3;          // thresholds that a search may start with, each half the one before
 constexpr std::size_t kModels = 4;  // the most prominent ones tell the scale
 
 }  // namespace
@@ -63,7 +66,7 @@ Expected<double> common_sigma(const Ground& ground, std::span<const models::Plac
   }
   for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] *= ground.tau / ground.allowed_at(i);
   const auto tau = static_cast<double>(ground.tau);
-  return gaussian_part(nearest, tau / kSigmas, 2 * tau);
+  return gaussian_part(nearest, tau / kSigmas, kReach * tau);
 }
 
 std::vector<Known> as_known(std::vector<models::Placed>& found, std::span<const Kind> kinds, const FitResult& result) {
@@ -76,54 +79,154 @@ std::vector<Known> as_known(std::vector<models::Placed>& found, std::span<const 
 
 bool near(double a, double b, double share) { return std::abs(a - b) <= share * b; }
 
-}  // namespace
+/// Looks for models and for the threshold that their own noise asks for, in turn.
+class Estimate {
+ public:
+  struct Input {
+    kernels::FitnessEvaluator& evaluator;
+    const models::WorkingPoints& points;
+    const Part& part;
+    std::size_t finite_points;
+    const FitOptions& options;
+    Watch* watch;
+    std::span<const float> spread;
+  };
 
-Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
-                                        std::size_t finite_points, const FitOptions& options, Watch* watch, std::span<const float> spread) {
-  std::vector<Kind> kinds = make_kinds(options);
-  std::erase_if(kinds, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
-  const double unit = points.frame().scale;
-  double tau = kGenerous * unit;
-  std::vector<Known> known;
-  std::vector<float> distances(points.size()), nearest(points.size()), caps(points.size());
-  for (int round = 0; round < kRounds; ++round) {
-    resolve(kinds, options, finite_points, tau);
-    for (Kind& kind : kinds) kind.settings.sharpen = false;  // what follows fits the models anew
-    const Settings& settings = kinds.front().settings;
+  explicit Estimate(const Input& input)
+      : in_(input), kinds_(make_kinds(input.options)), distances_(input.points.size()), nearest_(input.points.size()),
+        caps_(input.points.size()) {
+    std::erase_if(kinds_, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
+  }
+
+  Expected<NoiseScale> run() {
+    const double unit = in_.points.frame().scale;
+    NoiseScale best{kGenerous * unit, {}};
+    double most = 0;
+    int starts = 0;
+    for (double start = best.threshold; starts < kStarts && rounds_ < kRounds; start /= 2) {
+      auto settled = settle(start);
+      if (!settled) return settled;
+      if (settled->models.empty()) {  // so wide that nothing stands out from what surrounds it
+        if (best.models.empty()) best.threshold = settled->threshold;
+        continue;
+      }
+      const auto weight = significance(*settled);
+      if (!weight) return tl::unexpected(weight.error());
+      const bool narrowed = settled->threshold <= start;
+      if (best.models.empty() || *weight > most) {
+        most = *weight;
+        best = std::move(*settled);
+      }
+      // A threshold that starts generous and still widens may follow a model of what surrounds the models.
+      if (narrowed) break;
+      ++starts;
+    }
+    return best;
+  }
+
+ private:
+  /// From one threshold on; no models where the first search finds none.
+  Expected<NoiseScale> settle(double tau) {
+    NoiseScale now{tau, {}};
+    while (rounds_ < kRounds) {
+      FitResult result;
+      auto found = search(now.threshold, result);
+      if (!found) return tl::unexpected(found.error());
+      if (found->empty()) {
+        if (now.models.empty()) {
+          now.threshold /= 2;
+          return now;
+        }
+        now.threshold *= 2;  // the models were followed into their own middle
+        continue;
+      }
+      const double searched = now.threshold;
+      if (auto done = follow(*found, now.threshold); !done) return tl::unexpected(done.error());
+      now.models = as_known(*found, kinds_, result);
+      if (near(now.threshold, searched, kAlike)) break;
+    }
+    return now;
+  }
+
+  Expected<std::vector<models::Placed>> search(double tau, FitResult& result) {
+    resolve(kinds_, in_.options, in_.finite_points, tau);
+    for (Kind& kind : kinds_) {
+      kind.settings.joint = false;  // what follows fits the models anew
+      // Prominent models in closed form are hit by few samples.
+      if (!in_.options.particles && kind.space->closed_form()) kind.settings.particles /= 2;
+    }
     Limits limits;
     limits.max_models = kModels;
-    MultiModel search(evaluator, kinds, points, part, options.seed + static_cast<std::uint64_t>(round) + 1, limits, spread);
-    search.watched_by(watch);
-    FitResult result;
+    const std::uint64_t seed = in_.options.seed + static_cast<std::uint64_t>(++rounds_);
+    MultiModel search(in_.evaluator, kinds_, in_.points, in_.part, seed, limits, in_.spread);
+    search.watched_by(in_.watch);
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
-    std::vector<models::Placed> found = search.found();
-    if (found.empty()) {  // so wide that nothing stands out from what surrounds it
-      tau /= 2;
-      continue;
-    }
-    // The models follow the threshold and it follows them, without a search each time; the next search starts where they have come to.
-    const double searched = tau;
+    return search.found();
+  }
+
+  /// The models follow the threshold and it follows them, without a search each time.
+  Expected<> follow(std::vector<models::Placed>& found, double& tau) {
+    const Settings& settings = kinds_.front().settings;
     for (int step = 0; step < kSteps; ++step) {
-      const std::vector<float> allowed = allowed_by(spread, static_cast<float>(tau));
-      const Ground ground{
-          .evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = static_cast<float>(tau), .allowed = allowed};
+      const std::vector<float> allowed = allowed_by(in_.spread, static_cast<float>(tau));
+      const Ground ground = ground_at(tau, allowed);
       if (step > 0) {
-        for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = points.finite(i) ? ground.allowed_at(i) : 0.0F;
+        cap(ground);
         for (auto& [space, theta] : found) {
-          if (auto done = refine_one(ground.of(*space), settings.loss, caps, theta); !done) return tl::unexpected(done.error());
+          if (auto done = refine_one(ground.of(*space), settings.loss, caps_, theta); !done) return tl::unexpected(done.error());
         }
       }
-      const auto sigma = common_sigma(ground, found, distances, nearest);
+      const auto sigma = common_sigma(ground, found, distances_, nearest_);
       if (!sigma) return tl::unexpected(sigma.error());
-      const double next = std::max(kSigmas * *sigma, kLeast * unit);
+      const double next = std::max(kSigmas * *sigma, kLeast * in_.points.frame().scale);
       const bool settled = near(next, tau, kSettled);
       tau = step < kFreeSteps ? next : std::sqrt(tau * next);
       if (settled) break;
     }
-    known = as_known(found, kinds, result);
-    if (near(tau, searched, kAlike)) break;
+    return {};
   }
-  return NoiseScale{tau, std::move(known)};
+
+  /// How far from chance the models are at the threshold, all together: less the logarithms of their false alarms.
+  Expected<double> significance(const NoiseScale& scale) {
+    const auto tau = static_cast<float>(scale.threshold);
+    const std::vector<float> allowed = allowed_by(in_.spread, tau);
+    const Ground ground = ground_at(scale.threshold, allowed);
+    cap(ground);
+    std::vector<float> caps = caps_;
+    for (std::size_t i = 0; i < caps.size(); ++i) caps[i] *= tau / ground.allowed_at(i);
+    double sum = 0;
+    for (const Known& model : scale.models) {
+      const models::ModelSpace& space = *kinds_[model.kind].space;
+      if (auto done = weigh(ground.of(space), model.theta, {}, distances_); !done) return tl::unexpected(done.error());
+      for (std::size_t i = 0; i < distances_.size(); ++i) distances_[i] *= tau / ground.allowed_at(i);
+      sum -= std::min(0.0, log_false_alarms(count_support(distances_, caps, tau), space.minimal_sample()));
+    }
+    return sum;
+  }
+
+  Ground ground_at(double tau, std::span<const float> allowed) const {
+    return {.evaluator = in_.evaluator,
+            .space = *kinds_.front().space,
+            .points = in_.points,
+            .tau = static_cast<float>(tau),
+            .allowed = allowed};
+  }
+
+  void cap(const Ground& ground) {
+    for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] = in_.points.finite(i) ? ground.allowed_at(i) : 0.0F;
+  }
+
+  Input in_;
+  std::vector<Kind> kinds_;
+  std::vector<float> distances_, nearest_, caps_;
+  int rounds_ = 0;  // of search, so far
+};
+
+}  // namespace
+
+Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
+                                        std::size_t finite_points, const FitOptions& options, Watch* watch, std::span<const float> spread) {
+  return Estimate({evaluator, points, part, finite_points, options, watch, spread}).run();
 }
 
 }  // namespace swarmfit::swarm
