@@ -55,8 +55,18 @@ std::vector<PottsEnergy::Label> PottsEnergy::cheapest() const {
 
 void PottsEnergy::close() {
   role_.assign(nodes(), Role::fixed);
-  make_graph();
-  find_pieces();
+  if (pieces_.empty()) {
+    make_graph();
+    find_pieces();
+  }
+  takers_.clear();
+  takers_.reserve(choices_.size());
+  for (Piece& piece : pieces_) find_takers(piece);
+}
+
+void PottsEnergy::forget_labels() {
+  first_.clear();
+  choices_.clear();
 }
 
 void PottsEnergy::make_graph() {
@@ -79,13 +89,10 @@ void PottsEnergy::make_graph() {
 }
 
 void PottsEnergy::find_pieces() {
-  pieces_.clear();
-  takers_.clear();
-  takers_.reserve(choices_.size());
   std::vector<bool> met(nodes(), false);
-  std::vector<std::int32_t> inside;
   for (std::size_t seed = 0; seed < nodes(); ++seed) {
     if (met[seed]) continue;
+    std::vector<std::int32_t>& inside = pieces_.emplace_back().nodes;
     inside.assign(1, static_cast<std::int32_t>(seed));
     met[seed] = true;
     for (std::size_t k = 0; k < inside.size(); ++k)
@@ -95,19 +102,18 @@ void PottsEnergy::find_pieces() {
         met[static_cast<std::size_t>(j)] = true;
         inside.push_back(j);
       }
-    find_takers(inside, pieces_.emplace_back());
   }
   // The longest work first, so that threads end together.
-  std::stable_sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) { return a.nodes > b.nodes; });
+  std::stable_sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) { return a.nodes.size() > b.nodes.size(); });
 }
 
-void PottsEnergy::find_takers(std::span<const std::int32_t> nodes, Piece& piece) {
-  piece.nodes = nodes.size();
+void PottsEnergy::find_takers(Piece& piece) {
+  piece.takers.clear();
   const auto of_label = [&](Label label) {
     return std::find_if(piece.takers.begin(), piece.takers.end(), [&](const Takers& t) { return t.label == label; });
   };
   // Counted first, then laid out label by label.
-  for (const std::int32_t i : nodes)
+  for (const std::int32_t i : piece.nodes)
     for (const Choice& choice : choices(static_cast<std::size_t>(i))) {
       auto found = of_label(choice.label);
       if (found == piece.takers.end()) found = piece.takers.insert(found, {choice.label, 0, 0, true});
@@ -120,7 +126,7 @@ void PottsEnergy::find_takers(std::span<const std::int32_t> nodes, Piece& piece)
     first += count;
   }
   takers_.resize(first);
-  for (const std::int32_t i : nodes)
+  for (const std::int32_t i : piece.nodes)
     for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[of_label(choice.label)->last++] = {i, choice.cost};
 }
 

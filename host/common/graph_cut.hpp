@@ -30,8 +30,10 @@ class PottsEnergy {
   /// Makes a label the ground. All weights must be even then.
   void set_ground(Label label) noexcept { ground_ = label; }
 
-  /// Call once after the last add, before any expansion.
+  /// Call after the last add, before any expansion.
   void close();
+  /// Nodes and their labels go, edges stay: as many nodes may be added again, and then it must be closed again.
+  void forget_labels();
 
   std::size_t nodes() const noexcept { return first_.size(); }
   std::size_t edges() const noexcept { return edges_.size(); }
@@ -66,7 +68,7 @@ class PottsEnergy {
     bool stale;  ///< something has changed since the label was last expanded
   };
   struct Piece {
-    std::size_t nodes = 0;
+    std::vector<std::int32_t> nodes;
     std::vector<Takers> takers;
   };
   enum class Role : std::uint8_t { fixed, may_take, takes };
@@ -80,7 +82,7 @@ class PottsEnergy {
   const Choice* find(std::size_t node, Label label) const;
   void make_graph();
   void find_pieces();
-  void find_takers(std::span<const std::int32_t> nodes, Piece& piece);
+  void find_takers(Piece& piece);
   Cost expand(Piece& piece, const Takers& takers, std::vector<Label>& labels);
   void set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take, std::span<const Label> labels);
   Cost fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take, std::span<const Label> labels) const;

@@ -168,7 +168,12 @@ class Hyperplane : public ModelSpace {
 
   bool refine(const Moments& m, Position& theta) const {
     if (!(m.total > 0)) return false;
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> solver(m.scatter);
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> solver;
+    if constexpr (D == 2) {
+      solver.computeDirect(m.scatter);
+    } else {
+      solver.compute(m.scatter);
+    }
     if (solver.info() != Eigen::Success) return false;
     // The second smallest spread tells a plane from a line of points, a line from a single point.
     if (!(solver.eigenvalues()[1] > 1e-12)) return false;

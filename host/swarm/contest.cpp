@@ -1,6 +1,7 @@
 // Between kinds: who wins a round, and what a curved winner must show for itself.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/swarm.hpp"
@@ -129,6 +130,7 @@ Expected<MultiModel::Outcome> MultiModel::look_flat(Candidate& best, Outcome oth
   // A curved model that lies in a plane may have no more points than its surroundings, and hold the swarms all the same; and samples of
   // what is flat determine none.
   if (otherwise == Outcome::unpaid && best.support.inliers() < settings_.min_inliers) return otherwise;
+  if (std::exchange(looked_flat_, true)) return otherwise;
   Candidate flat;
   flat.kind = kinds_.size() - 1;
   const std::size_t steps = steps_;

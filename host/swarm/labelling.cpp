@@ -6,7 +6,6 @@
 #include <numeric>
 #include <utility>
 
-#include "host/common/graph_cut.hpp"
 #include "host/swarm/payment.hpp"
 
 namespace swarmfit::swarm {
@@ -22,6 +21,13 @@ constexpr double kHopeless = 0.5;     // of a model's price: what is dearer by t
 constexpr double kCoherent = 0.5;     // share of neighbours alike, beyond chance, from which smoothness counts in full
 constexpr int kCycles = 3;            // of expansions over all labels
 constexpr std::size_t kSmoothed = 6;  // nearest neighbours that a point would agree with
+
+/// A number that tells a set of points from others (Fowler, Noll and Vo's hash); not 0.
+std::uint64_t mark_of(std::span<const std::uint32_t> points) {
+  std::uint64_t mark = 14695981039346656037U;
+  for (const std::uint32_t i : points) mark = (mark ^ (i + 1ULL)) * 1099511628211U;
+  return mark | 1;
+}
 
 }  // namespace
 
@@ -55,10 +61,13 @@ Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const mod
   return distances;
 }
 
-void Labelling::label(State& state) const {
-  common::PottsEnergy potts;
+void Labelling::label(State& state) {
   using Cost = common::PottsEnergy::Cost;
   const std::size_t points = part_.index().size(), models = state.models.size();
+  const bool new_edges = potts_smoothness_ != prices_.smoothness;
+  if (new_edges) potts_ = {};
+  common::PottsEnergy& potts = potts_;
+  potts.forget_labels();
   potts.reserve(points, points * (models + 1), edges_.size());
   std::vector<std::uint16_t> nearest(points, 0);
   for (std::size_t i = 0; i < points; ++i) {
@@ -82,38 +91,47 @@ void Labelling::label(State& state) const {
   // Gross outliers lie anywhere: a neighbour of theirs is not as odd as one that follows another model.
   potts.set_ground(0);
   for (const auto& [ends, count] : edges_) {
+    if (!new_edges) break;
     potts.add_edge(ends.first, ends.second, count * 2 * static_cast<Cost>(kUnit * prices_.smoothness / 2));
   }
+  potts_smoothness_ = prices_.smoothness;
   potts.close();
   // The newest model first: where labels are known already it is the one that changes them.
   std::vector<std::uint16_t> order(models + 1);
   std::iota(order.rbegin(), order.rend(), std::uint16_t{0});
   state.labels = std::move(nearest);
-  if (!edges_.empty()) potts.minimise(order, kCycles, state.labels, 1);
+  if (potts.edges() > 0) potts.minimise(order, kCycles, state.labels, 1);
   state.energy = static_cast<double>(potts.energy(state.labels)) / kUnit + prices_.model * static_cast<double>(models);
 }
 
-Expected<bool> Labelling::refit(State& state) const {
+Expected<bool> Labelling::refit(State& state) {
   State next = state;
   std::vector<std::uint32_t> own;
+  std::vector<std::size_t> moved;
+  std::vector<models::Position> to;
   for (std::size_t m = 0; m < state.models.size(); ++m) {
     own.clear();
     for (std::size_t i = 0; i < part_.index().size(); ++i) {
       if (state.labels[i] == m + 1) own.push_back(part_.index()[i]);
     }
+    // Nobody else has changed for a model whose points have not.
+    if (std::exchange(next.fitted[m], mark_of(own)) == next.fitted[m]) continue;
     const std::vector<double> weight(own.size(), 1.0);
     if (!ground_.space.refine(ground_.points, {own, weight}, next.models[m])) next.models[m] = state.models[m];
+    moved.push_back(m);
+    to.push_back(next.models[m]);
   }
-  auto distances = measure(next.models);
+  if (moved.empty()) return false;
+  auto distances = measure(to);
   if (!distances) return tl::unexpected(distances.error());
-  next.distances = std::move(*distances);
+  for (std::size_t k = 0; k < moved.size(); ++k) next.distances[moved[k]] = std::move((*distances)[k]);
   label(next);
   if (!(next.energy < state.energy - kLeastFall)) return false;
   state = std::move(next);
   return true;
 }
 
-Expected<> Labelling::alternate(State& state, double hopeless) const {
+Expected<> Labelling::alternate(State& state, double hopeless) {
   for (int round = 0; round < kAlternations; ++round) {
     auto better = refit(state);
     if (!better) return tl::unexpected(better.error());
@@ -130,6 +148,7 @@ Expected<bool> Labelling::drop_one() {
     State without = state_;
     without.models.erase(without.models.begin() + static_cast<std::ptrdiff_t>(m));
     without.distances.erase(without.distances.begin() + static_cast<std::ptrdiff_t>(m));
+    without.fitted.erase(without.fitted.begin() + static_cast<std::ptrdiff_t>(m));
     for (std::uint16_t& l : without.labels) {
       if (l == m + 1) l = 0;
       if (l > m + 1) --l;
@@ -170,6 +189,7 @@ Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<co
   State with = state_;
   with.models.push_back(proposal);
   with.distances.emplace_back(distances.begin(), distances.end());
+  with.fitted.push_back(0);
   label(with);
   if (auto done = alternate(with, state_.energy + kHopeless * prices_.model); !done) return tl::unexpected(done.error());
   if (!(with.energy < state_.energy - kLeastFall)) return false;
@@ -178,32 +198,32 @@ Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<co
   return true;
 }
 
-Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
-  auto measured = measure(proposals);
-  if (!measured) return tl::unexpected(measured.error());
-  const std::vector<std::vector<float>>& distances = *measured;
-  std::vector<std::uint8_t> open(proposals.size(), 1);
+void Labelling::weigh_gains(std::span<const std::vector<float>> distances, std::vector<double>& gains) const {
   std::vector<float> now(part_.index().size());
+  for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
+  for (std::size_t p = 0; p < gains.size(); ++p) {
+    // What promises nothing now is not asked again.
+    if (gains[p] < kPromising * prices_.model) continue;
+    gains[p] = saved(now, distances[p]) / static_cast<double>(ground_.tau);
+  }
+}
+
+Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
+  auto distances = measure(proposals);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<double> gains(proposals.size(), std::numeric_limits<double>::infinity());
+  weigh_gains(*distances, gains);
   bool any = false;
   for (int failures = 0; failures < kFailures;) {
-    for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
-    std::size_t best = proposals.size();
-    double most = kPromising * prices_.model;
-    for (std::size_t p = 0; p < proposals.size(); ++p) {
-      if (open[p] == 0) continue;
-      const double gain = saved(now, distances[p]) / static_cast<double>(ground_.tau);
-      if (gain < kPromising * prices_.model) open[p] = 0;
-      if (gain > most) {
-        most = gain;
-        best = p;
-      }
-    }
-    if (best == proposals.size()) break;
-    open[best] = 0;
-    auto joined = try_one(proposals[best], distances[best]);
+    const auto best = std::max_element(gains.begin(), gains.end());
+    if (best == gains.end() || !(*best > kPromising * prices_.model)) break;
+    const auto p = static_cast<std::size_t>(best - gains.begin());
+    gains[p] = 0;
+    auto joined = try_one(proposals[p], (*distances)[p]);
     if (!joined) return tl::unexpected(joined.error());
     any = any || *joined;
     failures += *joined ? 0 : 1;
+    if (*joined) weigh_gains(*distances, gains);
   }
   return any;
 }
@@ -214,6 +234,7 @@ Expected<> Labelling::start(std::span<const models::Position> models) {
   auto distances = measure(models);
   if (!distances) return tl::unexpected(distances.error());
   state_.distances = std::move(*distances);
+  state_.fitted.assign(models.size(), 0);
   kept_.resize(models.size());
   std::iota(kept_.begin(), kept_.end(), std::size_t{0});
   const double wanted = std::exchange(prices_.smoothness, 0.0);

@@ -9,6 +9,7 @@
 
 #include <swarmfit/error.hpp>
 
+#include "host/common/graph_cut.hpp"
 #include "host/models/neighbours.hpp"
 #include "host/swarm/refinement.hpp"
 #include "host/swarm/settings.hpp"
@@ -48,6 +49,7 @@ class Labelling {
   struct State {
     std::vector<models::Position> models;
     std::vector<std::vector<float>> distances;  // of each model, one a point of the part
+    std::vector<std::uint64_t> fitted;          // of each model, what tells the points that it was last fitted to; 0 none
     std::vector<std::uint16_t> labels;          // one a point of the part
     double energy = 0;
   };
@@ -55,20 +57,24 @@ class Labelling {
   /// Of each model to each point of the part.
   Expected<std::vector<std::vector<float>>> measure(std::span<const models::Position> models) const;
   /// The labels of the state's models, from those it has where they may stay; and the energy.
-  void label(State& state) const;
-  Expected<bool> refit(State& state) const;
+  void label(State& state);
+  Expected<bool> refit(State& state);
   Expected<bool> drop_one();
   Expected<bool> try_one(const models::Position& proposal, std::span<const float> distances);
   double cost(std::size_t point) const;
   /// How much more alike neighbours are than chance would have it, in [0, 1], over the edges at points that models own.
   double coherence() const;
   /// Labels and models in turn while the energy falls, or until it is found above `hopeless`.
-  Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity()) const;
+  Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity());
+  /// What each proposal would save of what the points cost as things stand, in units of tau.
+  void weigh_gains(std::span<const std::vector<float>> distances, std::vector<double>& gains) const;
 
   const Ground& ground_;
   const Subset& part_;
   LabelPrices prices_;
   std::vector<std::pair<std::pair<int, int>, int>> edges_;  // two points, and how many of them ask for the other
+  common::PottsEnergy potts_;                               // its edges are those of `edges_` at a price of `potts_smoothness_`
+  double potts_smoothness_ = -1;
   State state_;
   std::vector<std::size_t> kept_;
 };

@@ -8,13 +8,13 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr float kSlabs = 6;             // each tau wide, on each side of a model: what lies within is along it
-constexpr std::size_t kNear = 16;       // points along the model that tell the densities about one of them
-constexpr double kPrior = 4;            // points' worth of what is known of the model as a whole
-constexpr double kLeastBeside = 0.5;    // no place is so empty that an outlier could not be there
-constexpr double kLeft = 0.5;           // what a point within tau that its model was denied still counts for it
-constexpr double kSigmasPerTau = 2.5;   // 98.8 % of a Gaussian lie within tau
-constexpr int kPasses = 2;              // the second knows which points the first denied
+constexpr float kSlabs = 6;            // each tau wide, on each side of a model: what lies within is along it
+constexpr std::size_t kNear = 16;      // points along the model that tell the densities about one of them
+constexpr double kPrior = 4;           // points' worth of what is known of the model as a whole
+constexpr double kLeastBeside = 0.5;   // no place is so empty that an outlier could not be there
+constexpr double kLeft = 0.5;          // what a point within tau that its model was denied still counts for it
+constexpr double kSigmasPerTau = 2.5;  // 98.8 % of a Gaussian lie within tau
+constexpr int kPasses = 2;             // the second knows which points the first denied
 
 /// The points along one model, in the order of the coordinate in which they spread most.
 class Along {
@@ -22,31 +22,26 @@ class Along {
   Along(const models::WorkingPoints& points, std::span<const float> distances, std::span<const std::uint16_t> nearest, std::uint16_t label,
         float tau) {
     for (std::uint32_t i = 0; i < distances.size(); ++i) {
-      const bool within = distances[i] <= kSlabs * tau && (nearest[i] == 0 || nearest[i] == label);
-      if (within) index_.push_back(i);
+      if (!(distances[i] <= kSlabs * tau) || (nearest[i] != 0 && nearest[i] != label)) continue;
+      all_.push_back({{}, i});
+      for (int d = 0; d < points.dimension(); ++d) all_.back().at[static_cast<std::size_t>(d)] = points.at(i, d);
     }
-    const int axis = widest(points);
-    std::sort(index_.begin(), index_.end(), [&](std::uint32_t a, std::uint32_t b) {
-      const double at_a = points.at(a, axis), at_b = points.at(b, axis);
-      return at_a < at_b || (at_a == at_b && a < b);
-    });
-    at_.resize(index_.size());
-    for (std::size_t k = 0; k < index_.size(); ++k) {
-      for (int d = 0; d < points.dimension(); ++d) at_[k][static_cast<std::size_t>(d)] = points.at(index_[k], d);
-      std::swap(at_[k][0], at_[k][static_cast<std::size_t>(axis)]);
-    }
+    const std::size_t axis = widest();
+    for (One& one : all_) std::swap(one.at[0], one.at[axis]);
+    std::sort(all_.begin(), all_.end(),
+              [](const One& a, const One& b) { return a.at[0] < b.at[0] || (a.at[0] == b.at[0] && a.point < b.point); });
   }
 
-  std::size_t size() const noexcept { return index_.size(); }
-  std::uint32_t point(std::size_t place) const noexcept { return index_[place]; }
+  std::size_t size() const noexcept { return all_.size(); }
+  std::uint32_t point(std::size_t place) const noexcept { return all_[place].point; }
 
   /// Places of the points nearest to that at a place, itself left out; where two are as near, the one that comes first on the walk outwards.
   std::size_t near(std::size_t place, std::array<std::uint32_t, kNear>& nearest) const {
     std::array<double, kNear> square{};
     std::size_t count = 0, below = place, above = place + 1;
     for (;;) {
-      const double down = below > 0 ? at_[place][0] - at_[below - 1][0] : kNothing;
-      const double up = above < at_.size() ? at_[above][0] - at_[place][0] : kNothing;
+      const double down = below > 0 ? all_[place].at[0] - all_[below - 1].at[0] : kNothing;
+      const double up = above < all_.size() ? all_[above].at[0] - all_[place].at[0] : kNothing;
       const double step = std::min(down, up);
       if (step == kNothing || (count == kNear && step * step >= square[kNear - 1])) return count;
       const std::size_t other = down <= up ? --below : above++;
@@ -64,16 +59,19 @@ class Along {
 
  private:
   static constexpr double kNothing = std::numeric_limits<double>::infinity();
-  using Coordinates = std::array<double, models::kMaxDimension>;
+  struct One {
+    std::array<double, models::kMaxDimension> at;
+    std::uint32_t point;
+  };
 
-  int widest(const models::WorkingPoints& points) const {
-    int widest = 0;
+  std::size_t widest() const {
+    std::size_t widest = 0;
     double most = -1;
-    for (int d = 0; d < points.dimension(); ++d) {
+    for (std::size_t d = 0; d < models::kMaxDimension; ++d) {
       double low = kNothing, high = -kNothing;
-      for (const std::uint32_t i : index_) {
-        low = std::min(low, points.at(i, d));
-        high = std::max(high, points.at(i, d));
+      for (const One& one : all_) {
+        low = std::min(low, one.at[d]);
+        high = std::max(high, one.at[d]);
       }
       if (!(high - low > most)) continue;
       most = high - low;
@@ -84,12 +82,11 @@ class Along {
 
   double apart(std::size_t a, std::size_t b) const {
     double sum = 0;
-    for (std::size_t d = 0; d < at_[a].size(); ++d) sum += (at_[a][d] - at_[b][d]) * (at_[a][d] - at_[b][d]);
+    for (std::size_t d = 0; d < models::kMaxDimension; ++d) sum += (all_[a].at[d] - all_[b].at[d]) * (all_[a].at[d] - all_[b].at[d]);
     return sum;
   }
 
-  std::vector<std::uint32_t> index_;
-  std::vector<Coordinates> at_;
+  std::vector<One> all_;
 };
 
 /// How many times likelier a point at distance d of tau is the model's than an outlier, where `own` points near it are the model's
@@ -172,7 +169,8 @@ std::vector<std::uint16_t> label_locally(const models::WorkingPoints& points, st
   const std::vector<std::uint16_t> nearest = nearest_of(distances, tau, points.size());
   std::vector<Reach> reaches;
   reaches.reserve(distances.size());
-  for (std::size_t m = 0; m < distances.size(); ++m) reaches.emplace_back(points, distances[m], nearest, static_cast<std::uint16_t>(m + 1), tau);
+  for (std::size_t m = 0; m < distances.size(); ++m)
+    reaches.emplace_back(points, distances[m], nearest, static_cast<std::uint16_t>(m + 1), tau);
   std::vector<std::uint16_t> labels;
   std::vector<float> least;
   for (int pass = 0; pass < kPasses; ++pass) {

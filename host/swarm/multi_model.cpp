@@ -80,6 +80,7 @@ Expected<> MultiModel::take(const Candidate& candidate, Outcome outcome, const M
   auto go_on = kept ? accept(candidate, on_model, result) : Expected<bool>(true);
   if (!go_on) return tl::unexpected(go_on.error());
   if (!kept) hidden_.push_back({&space(candidate.kind), candidate.theta});
+  looked_flat_ = false;
   if (auto done = deflate(candidate); !done) return done;
   if (!*go_on) stop_reason_ = "stopped by the caller";
   return {};
@@ -310,9 +311,7 @@ void MultiModel::tell_parameters(FitResult& result) const {
   for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
 }
 
-bool MultiModel::labels_locally() const noexcept {
-  return settings_.sharpen && !part_searched_ && points_.finite_count() <= kFewPoints;
-}
+bool MultiModel::labels_locally() const noexcept { return settings_.sharpen && !part_searched_ && points_.finite_count() <= kFewPoints; }
 
 Expected<> MultiModel::share_out_locally() {
   auto distances = measure(ground_, found_);

@@ -93,7 +93,10 @@ class Estimate {
   };
 
   explicit Estimate(const Input& input)
-      : in_(input), kinds_(make_kinds(input.options)), distances_(input.points.size()), nearest_(input.points.size()),
+      : in_(input),
+        kinds_(make_kinds(input.options)),
+        distances_(input.points.size()),
+        nearest_(input.points.size()),
         caps_(input.points.size()) {
     std::erase_if(kinds_, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
   }
@@ -112,7 +115,8 @@ class Estimate {
       }
       const auto weight = significance(*settled);
       if (!weight) return tl::unexpected(weight.error());
-      const bool narrowed = settled->threshold <= start;
+      const double most_growth = starts == 0 && start == kGenerous * unit ? 1 : 1 + kAlike;
+      const bool narrowed = settled->threshold <= most_growth * start;
       if (best.models.empty() || *weight > most) {
         most = *weight;
         best = std::move(*settled);

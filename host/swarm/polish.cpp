@@ -8,8 +8,8 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr float kOwn = 2;                 // tau: points farther from a model have no say in its last steps
-constexpr int kExchanges = 30;            // of one of the points that a model runs through, at most
+constexpr float kOwn = 2;       // tau: points farther from a model have no say in its last steps
+constexpr int kExchanges = 30;  // of one of the points that a model runs through, at most
 
 /// Places of the `count` smallest of the distances that are at most `tau`, smallest first, and then the rest of those in their order.
 std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float tau, std::size_t count) {
