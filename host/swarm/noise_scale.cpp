@@ -57,13 +57,11 @@ double gaussian_part(std::span<const float> distances, double guess, double reac
 namespace {
 
 /// Sigma that the points within reach of the models show, each of its nearest one.
-Expected<double> common_sigma(const Ground& ground, std::span<const models::Placed> models, std::vector<float>& distances,
-                              std::vector<float>& nearest) {
+Expected<double> common_sigma(const Ground& ground, std::span<const models::Placed> models, std::vector<float>& nearest) {
+  auto distances = measure(ground, models);
+  if (!distances) return tl::unexpected(distances.error());
   std::fill(nearest.begin(), nearest.end(), std::numeric_limits<float>::infinity());
-  for (const auto& [space, theta] : models) {
-    if (auto done = weigh(ground.of(*space), theta, {}, distances); !done) return tl::unexpected(done.error());
-    take_nearer(distances, nearest);
-  }
+  for (const std::vector<float>& one : *distances) take_nearer(one, nearest);
   for (std::size_t i = 0; i < nearest.size(); ++i) nearest[i] *= ground.tau / ground.allowed_at(i);
   const auto tau = static_cast<double>(ground.tau);
   return gaussian_part(nearest, tau / kSigmas, kReach * tau);
@@ -180,7 +178,7 @@ class Estimate {
           if (auto done = refine_one(ground.of(*space), settings.loss, caps_, theta); !done) return tl::unexpected(done.error());
         }
       }
-      const auto sigma = common_sigma(ground, found, distances_, nearest_);
+      const auto sigma = common_sigma(ground, found, nearest_);
       if (!sigma) return tl::unexpected(sigma.error());
       const double next = std::max(kSigmas * *sigma, kLeast * in_.points.frame().scale);
       const bool settled = near(next, tau, kSettled);

@@ -9,6 +9,8 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr float kOwn = 2;       // tau: points farther from a model have no say in its last steps
+constexpr float kTouched = 0.5F;  // tau: on its last steps a model runs through points no farther from where it was
+constexpr std::size_t kStarts = 2;  // of exchanges: they may end in different places
 constexpr int kExchanges = 30;  // of one of the points that a model runs through, at most
 
 /// Places of the `count` smallest of the distances that are at most `tau`, smallest first, and then the rest of those in their order.
@@ -69,24 +71,31 @@ Expected<> MultiModel::run_through_points(models::Placed& model) {
   if (auto done = weigh(ground_.of(of), model.theta, caps_, distances); !done) return tl::unexpected(done.error());
   std::vector<float> room;
   const std::span<const float> level = levelled(distances, room);
-  const std::vector<std::uint32_t> near = nearest_first(level, tau_, size);
-  if (near.size() <= size) return {};
+  const std::vector<std::uint32_t> near = nearest_first(level, kTouched * tau_, kStarts * size);
+  if (near.size() <= kStarts * size) return {};
   // Where two models cross, turning about their common point would lead from one to the other.
   std::vector<float> own = caps_;
   for (std::size_t i = 0; i < own.size(); ++i) own[i] = level[i] <= kOwn * tau_ ? own[i] : 0.0F;
   if (auto done = show(own); !done) return done;
 
-  Exchange best{model.theta, {near.begin(), near.begin() + static_cast<std::ptrdiff_t>(size)}, 0};
   auto loss = landscapes_[kind].loss(model.theta);
   if (!loss) return tl::unexpected(loss.error());
-  best.loss = *loss;
-  std::size_t fruitless = 0;
-  for (int exchange = 0; exchange < kExchanges && fruitless < size; ++exchange) {
-    auto better = exchange_one(kind, near, static_cast<std::size_t>(exchange) % size, best);
-    if (!better) return tl::unexpected(better.error());
-    fruitless = *better ? 0 : fruitless + 1;
+  double least = *loss;
+  models::Position end = model.theta;
+  for (std::size_t start = 0; start < kStarts; ++start) {
+    const auto first = near.begin() + static_cast<std::ptrdiff_t>(start * size);
+    Exchange best{model.theta, {first, first + static_cast<std::ptrdiff_t>(size)}, *loss};
+    std::size_t fruitless = 0;
+    for (int exchange = 0; exchange < kExchanges && fruitless < size; ++exchange) {
+      auto better = exchange_one(kind, near, static_cast<std::size_t>(exchange) % size, best);
+      if (!better) return tl::unexpected(better.error());
+      fruitless = *better ? 0 : fruitless + 1;
+    }
+    if (!(best.loss < least)) continue;
+    least = best.loss;
+    end = best.theta;
   }
-  model.theta = best.theta;
+  model.theta = end;
   return {};
 }
 

@@ -24,12 +24,11 @@ double loss_of(const kernels::Evidence& evidence, Loss loss, std::span<const flo
 
 /// Sum over points of the distance to the nearest model, at most tau.
 Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models) {
-  std::vector<float> distances(ground.size()), least(ground.size());
+  auto distances = measure(ground, models);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<float> least(ground.size());
   for (std::size_t i = 0; i < least.size(); ++i) least[i] = ground.allowed_at(i);
-  for (const models::Placed& model : models) {
-    if (auto done = weigh(ground.of(*model.space), model.theta, {}, distances); !done) return tl::unexpected(done.error());
-    take_nearer(distances, least);
-  }
+  for (const std::vector<float>& one : *distances) take_nearer(one, least);
   double energy = 0;
   for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(ground.index(i)) ? static_cast<double>(least[i]) : 0.0;
   return energy;
@@ -118,11 +117,21 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
 }
 
 Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models) {
-  std::vector<std::vector<float>> all(models.size(), std::vector<float>(ground.size()));
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    if (auto done = weigh(ground.of(*models[m].space), models[m].theta, {}, all[m]); !done) return tl::unexpected(done.error());
+  // In one pass: the points are loaded once for all models.
+  ModelRows rows(ground.points.frame(), models.size());
+  for (const auto& [space, theta] : models) rows.add(*space, theta);
+  const std::size_t points = ground.size();
+  std::vector<float> all(points * models.size());
+  std::vector<kernels::Evidence> evidence(models.size());
+  if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), rows.views(), all, evidence); !done) {
+    return tl::unexpected(to_error(done.error()));
   }
-  return all;
+  std::vector<std::vector<float>> distances(models.size());
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(m * points);
+    distances[m].assign(first, first + static_cast<std::ptrdiff_t>(points));
+  }
+  return distances;
 }
 
 void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps) {
@@ -158,14 +167,14 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed
 
 Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
   constexpr std::uint16_t kSeveral = 65535;
+  auto distances = measure(ground, models);
+  if (!distances) return tl::unexpected(distances.error());
   std::vector<std::uint16_t> owner(ground.size(), 0);
-  std::vector<float> distances(ground.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
-    if (auto done = weigh(ground.of(*models[m].space), models[m].theta, {}, distances); !done) return tl::unexpected(done.error());
     const auto mine = static_cast<std::uint16_t>(m + 1);
-    for (std::size_t i = 0; i < distances.size(); ++i) {
+    for (std::size_t i = 0; i < owner.size(); ++i) {
       const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;
-      owner[i] = distances[i] <= ground.allowed_at(i) ? taken : owner[i];
+      owner[i] = (*distances)[m][i] <= ground.allowed_at(i) ? taken : owner[i];
     }
   }
   std::vector<std::size_t> unique(models.size(), 0);
