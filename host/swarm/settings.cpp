@@ -141,7 +141,11 @@ Settings preset(Preset preset) {
 
 /// What a kind asks of the search beyond the preset, where the preset is free to choose.
 Settings for_kind(Settings s, ModelType type) {
-  if (!s.joint || type == ModelType::line2d || type == ModelType::plane) return s;
+  if (!s.joint || type == ModelType::plane) return s;
+  if (type == ModelType::line2d) {
+    s.particles = 64;  // of two dimensions more of them find no more
+    return s;
+  }
   // Few minimal samples of a curved model hit one surface, and flight alone seldom finds another basin: particles start anew all along.
   s.renewal_share = 0.5;
   s.patience = 3;
