@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
@@ -22,6 +23,7 @@ constexpr double kAlike = 0.25;     // one below which a search would find the s
 constexpr int kFreeSteps = 2;       // of the threshold; further ones go half the way, for it may swing between two models' noise
 constexpr int kRounds = 10;         // of search
 constexpr int kSteps = 10;          // of models and threshold in turn, after each
+constexpr double kWidest = 0.25;    // of the cloud's width: a slab that has half the cloud within it tells no noise
 constexpr int kStarts = 3;          // thresholds that a search may start with, each half the one before
 constexpr std::size_t kModels = 4;  // the most prominent ones tell the scale
 
@@ -95,7 +97,8 @@ class Estimate {
         kinds_(make_kinds(input.options)),
         distances_(input.points.size()),
         nearest_(input.points.size()),
-        caps_(input.points.size()) {
+        caps_(input.points.size()),
+        width_(std::sqrt(12.0 / input.points.dimension()) * input.points.frame().scale) {
     std::erase_if(kinds_, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
   }
 
@@ -130,6 +133,7 @@ class Estimate {
   /// From one threshold on; no models where the first search finds none.
   Expected<NoiseScale> settle(double tau) {
     NoiseScale now{tau, {}};
+    bool widened = false;
     while (rounds_ < kRounds) {
       FitResult result;
       auto found = search(now.threshold, result);
@@ -139,13 +143,14 @@ class Estimate {
           now.threshold /= 2;
           return now;
         }
-        now.threshold *= 2;  // the models were followed into their own middle
+        now.threshold *= widened ? 0.5 : 2.0;  // the models were followed into their own middle
+        if (std::exchange(widened, true)) break;
         continue;
       }
       const double searched = now.threshold;
       if (auto done = follow(*found, now.threshold); !done) return tl::unexpected(done.error());
       now.models = as_known(*found, kinds_, result);
-      if (near(now.threshold, searched, kAlike)) break;
+      if (near(now.threshold, searched, kAlike) || now.threshold > kWidest * width_) break;
     }
     return now;
   }
@@ -188,7 +193,8 @@ class Estimate {
     return {};
   }
 
-  /// How far from chance the models are at the threshold, all together: less the logarithms of their false alarms.
+  /// How far from chance the models are at the threshold, all together: less the logarithms of their false alarms. What surrounds a model
+  /// is at least as dense as the cloud would be if its points were strewn evenly, so that a slab as wide as the cloud means nothing.
   Expected<double> significance(const NoiseScale& scale) {
     const auto tau = static_cast<float>(scale.threshold);
     const std::vector<float> allowed = allowed_by(in_.spread, tau);
@@ -196,12 +202,15 @@ class Estimate {
     cap(ground);
     std::vector<float> caps = caps_;
     for (std::size_t i = 0; i < caps.size(); ++i) caps[i] *= tau / ground.allowed_at(i);
+    const double evenly = std::min(1.0, 2 * scale.threshold / width_) * static_cast<double>(in_.points.finite_count());
+    if (scale.threshold > kWidest * width_) return 0.0;
     double sum = 0;
     for (const Known& model : scale.models) {
       const models::ModelSpace& space = *kinds_[model.kind].space;
       if (auto done = weigh(ground.of(space), model.theta, {}, distances_); !done) return tl::unexpected(done.error());
       for (std::size_t i = 0; i < distances_.size(); ++i) distances_[i] *= tau / ground.allowed_at(i);
-      sum -= std::min(0.0, log_false_alarms(count_support(distances_, caps, tau), space.minimal_sample()));
+      const Support support = count_support(distances_, caps, tau);
+      if (support.inliers() > 0) sum -= std::min(0.0, log_false_alarms(support, space.minimal_sample(), evenly));
     }
     return sum;
   }
@@ -221,6 +230,7 @@ class Estimate {
   Input in_;
   std::vector<Kind> kinds_;
   std::vector<float> distances_, nearest_, caps_;
+  double width_;    // of the cloud, were its points strewn evenly [data unit]
   int rounds_ = 0;  // of search, so far
 };
 

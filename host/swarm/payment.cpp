@@ -54,11 +54,12 @@ double log_false_alarms(double n, double share, double chance, int minimal_sampl
 
 }  // namespace
 
-double log_false_alarms(const Support& support, int minimal_sample) {
+double log_false_alarms(const Support& support, int minimal_sample, double least_background) {
   if (support.inliers() == 0) return 1e300;
   // A swarm finds the place where a gap on either side flatters the model, so what is farther off has a say as well.
   const auto wide = static_cast<double>(std::accumulate(support.slabs.begin() + 1, support.slabs.end(), std::size_t{0}));
-  const double background = std::max(static_cast<double>(support.band()) / 2, wide / static_cast<double>(Support::kSlabs - 1));
+  const double background =
+      std::max({static_cast<double>(support.band()) / 2, wide / static_cast<double>(Support::kSlabs - 1), least_background});
   return log_false_alarms(static_cast<double>(support.unexplained), static_cast<double>(support.inliers()), background, minimal_sample);
 }
 

@@ -35,8 +35,8 @@ Support count_support(std::span<const float> distances, std::span<const float> c
 
 /// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
 /// binomial tail, background density from the band or from all slabs beyond the first, whichever is denser, one test for each minimal
-/// sample of the points). Lower is more meaningful.
-double log_false_alarms(const Support& support, int minimal_sample);
+/// sample of the points). Lower is more meaningful. `least_background`: points that surroundings put into a slab at least.
+double log_false_alarms(const Support& support, int minimal_sample, double least_background = 0);
 
 /// Two surfaces side by side are each other's surroundings, and neither would pay. So the ring from tau / 2 to tau may be the background as well,
 /// where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise.

@@ -8,10 +8,10 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr float kOwn = 2;       // tau: points farther from a model have no say in its last steps
-constexpr float kTouched = 0.5F;  // tau: on its last steps a model runs through points no farther from where it was
+constexpr float kOwn = 2;           // tau: points farther from a model have no say in its last steps
+constexpr float kTouched = 0.5F;    // tau: on its last steps a model runs through points no farther from where it was
 constexpr std::size_t kStarts = 2;  // of exchanges: they may end in different places
-constexpr int kExchanges = 30;  // of one of the points that a model runs through, at most
+constexpr int kExchanges = 30;      // of one of the points that a model runs through, at most
 
 /// Places of the `count` smallest of the distances that are at most `tau`, smallest first, and then the rest of those in their order.
 std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float tau, std::size_t count) {
