@@ -167,6 +167,36 @@ TEST(GraphCut, OneExpansionIsTheBestOfAllSubsets) {
   }
 }
 
+TEST(GraphCut, OtherLabelsOnTheSameEdgesAreAsMadeAnew) {
+  Random random(5);
+  for (int trial = 0; trial < 50; ++trial) {
+    Grid grid = random_grid(random, 4, 4, 3);
+    std::vector<common::PottsEnergy::Label> used(16, 0);
+    const std::array<common::PottsEnergy::Label, 4> order{0, 1, 2, 3};
+    grid.energy.minimise(order, 3, used, 1);
+    // Some nodes lose a label, and all may take a new one.
+    common::PottsEnergy fresh;
+    grid.energy.forget_labels();
+    for (std::size_t i = 0; i < 16; ++i) {
+      fresh.add_node();
+      grid.energy.add_node();
+      for (common::PottsEnergy::Label l = 0; l < 4; ++l) {
+        if (l == 1 && i % 3 == 0) continue;
+        const int cost = random.below(20);
+        fresh.add_label(l, cost);
+        grid.energy.add_label(l, cost);
+      }
+    }
+    for (const auto& [i, j, weight] : grid.edges) fresh.add_edge(i, j, weight);
+    fresh.close();
+    grid.energy.close();
+    std::vector<common::PottsEnergy::Label> again(16, 0), anew(16, 0);
+    EXPECT_EQ(grid.energy.minimise(order, 3, again, 1), fresh.minimise(order, 3, anew, 1));
+    EXPECT_EQ(again, anew);
+    EXPECT_EQ(grid.energy.energy(again), fresh.energy(anew));
+  }
+}
+
 TEST(GraphCut, MinimisingEndsWithinTwiceTheOptimum) {
   Random random(4);
   int exact = 0;

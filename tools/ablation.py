@@ -25,28 +25,31 @@ TAU = 2.5 * SIGMA
 LINE_ROWS = [
     ("fast", "the default", []),
     ("fast, parametric deflation", "Eq. (5) instead of sinking caps", ["--deflation", "parametric"]),
-    ("fast, s = 5", "swarms end sooner", ["--stall", "5"]),
-    ("fast, s = 20", "and later", ["--stall", "20"]),
-    ("fast, 50 particles", "", ["--particles", "50"]),
+    ("fast, s = 3", "swarms end sooner", ["--stall", "3"]),
+    ("fast, s = 10", "later", ["--stall", "10"]),
+    ("fast, s = 20", "and later still", ["--stall", "20"]),
+    ("fast, 32 particles", "", ["--particles", "32"]),
     ("fast, 200 particles", "", ["--particles", "200"]),
-    ("fast, no flight", "random sampling, half of it local; the best refined", ["--particles", "2500", "--iterations", "1"]),
-    ("fast, no flight, more", "the same with more samples", ["--particles", "5000", "--iterations", "1"]),
+    ("fast, no flight", "random sampling, half of it local; the best refined", ["--particles", "1250", "--iterations", "1"]),
+    ("fast, no flight, more", "the same with more samples", ["--particles", "2500", "--iterations", "1"]),
     ("paper", "Zhou et al. 2010", ["--preset", "paper"]),
     ("paper, residual deflation", "", ["--preset", "paper", "--deflation", "residual"]),
     ("paper, 200 particles", "", ["--preset", "paper", "--particles", "200"]),
     ("paper, no flight", "random sampling, nothing refined", ["--preset", "paper", "--particles", "5000", "--iterations", "1"]),
 ]
 PLANE_ROWS = LINE_ROWS
+# Without flight the samples of all swarms are what the joint end chooses from: random sampling and PEaRL (Isack and Boykov 2012) for pairs.
 REAL_ROWS = [
     ("fast", "the default", []),
     ("fast, parametric deflation", "", ["--deflation", "parametric"]),
     ("fast, s = 5", "", ["--stall", "5"]),
+    ("fast, s = 10", "", ["--stall", "10"]),
     ("fast, s = 20", "", ["--stall", "20"]),
     ("fast, 50 particles", "", ["--particles", "50"]),
-    ("fast, no flight", "random sampling; the best refined", ["--particles", "2500", "--iterations", "1"]),
+    ("fast, no flight", "random sampling, then the joint end", ["--particles", "1250", "--iterations", "1"]),
+    ("fast, no flight, more", "the same with more samples", ["--particles", "2500", "--iterations", "1"]),
     ("paper", "", ["--preset", "paper"]),
 ]
-
 
 def line_scene(rng, count):
     points, labels = [], []
@@ -153,14 +156,14 @@ def real_table(binary, groups, seeds, folder):
 
 def real_files(data):
     groups = []
-    for folder, model in (("adelaide_h", "homography"), ("adelaide_f", "fundamental")):
+    for folder, model, title in (("adelaide_h", "homography", "AdelaideRMF homographies"), ("adelaide_f", "fundamental", "AdelaideRMF fundamental matrices")):
         files = sorted((data / folder).glob("*.csv"))
         if files:
-            groups.append((f"{folder}, {len(files)} scenes", [(model, f) for f in files]))
+            groups.append((f"{title}, {len(files)} scenes", [(model, f) for f in files]))
     toldo = sorted((data / "toldo").glob("*.csv"))
     if toldo:
         kinds = [("circle2d" if f.name.startswith("Circle") else "line2d", f) for f in toldo]
-        groups.append((f"toldo, {len(toldo)} scenes", kinds))
+        groups.append((f"Toldo's lines and circles, {len(toldo)} scenes", kinds))
     return groups
 
 

@@ -98,7 +98,10 @@ class MultiModel {
   Expected<bool> accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate(const Candidate& candidate);
   Expected<> finish(FitResult& result);
+  /// Each model refined on what the others leave it, as far as that does not raise the energy of all.
   Expected<> polish();
+  Expected<> polish_each();
+  Expected<> keep_what_lowers(const std::vector<models::Placed>& before);
   /// The least absolute deviations of a model run through as many points as it has degrees of freedom (Barrodale and Roberts 1973):
   /// from the points nearest to it, one at a time is exchanged for whichever lowers the loss most, until none does.
   Expected<> run_through_points(models::Placed& model);

@@ -1,6 +1,7 @@
 // The joint end of models that share no points: each refined on what the others leave it.
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/refinement.hpp"
@@ -40,6 +41,34 @@ float MultiModel::corner(const models::ModelSpace& of) const noexcept {
 }
 
 Expected<> MultiModel::polish() {
+  const std::vector<models::Placed> before = found_;
+  if (auto done = polish_each(); !done) return done;
+  return shares_out() || part_searched_ ? Expected<>() : keep_what_lowers(before);
+}
+
+Expected<> MultiModel::keep_what_lowers(const std::vector<models::Placed>& before) {
+  // What is best for one model alone may cost another where they cross.
+  auto least = joint_energy(ground_, before);
+  const auto after = joint_energy(ground_, found_);
+  if (!least) return tl::unexpected(least.error());
+  if (!after) return tl::unexpected(after.error());
+  if (!(*after > *least)) return {};
+  std::vector<models::Placed> kept = before;
+  for (std::size_t m = 0; m < kept.size(); ++m) {
+    std::swap(kept[m], found_[m]);
+    const auto now = joint_energy(ground_, kept);
+    if (!now) return tl::unexpected(now.error());
+    if (*now > *least) {
+      std::swap(kept[m], found_[m]);
+    } else {
+      least = now;
+    }
+  }
+  found_ = std::move(kept);
+  return {};
+}
+
+Expected<> MultiModel::polish_each() {
   // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs. Not so among kinds: a ball
   // lies along the table that it lies on.
   restore_caps();

@@ -22,18 +22,6 @@ double loss_of(const kernels::Evidence& evidence, Loss loss, std::span<const flo
   return sum;
 }
 
-/// Sum over points of the distance to the nearest model, at most tau.
-Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models) {
-  auto distances = measure(ground, models);
-  if (!distances) return tl::unexpected(distances.error());
-  std::vector<float> least(ground.size());
-  for (std::size_t i = 0; i < least.size(); ++i) least[i] = ground.allowed_at(i);
-  for (const std::vector<float>& one : *distances) take_nearer(one, least);
-  double energy = 0;
-  for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(ground.index(i)) ? static_cast<double>(least[i]) : 0.0;
-  return energy;
-}
-
 }  // namespace
 
 kernels::Weighing Ground::weighing(std::span<const float> caps, float corner_of_tau) const {
@@ -132,6 +120,17 @@ Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::spa
     distances[m].assign(first, first + static_cast<std::ptrdiff_t>(points));
   }
   return distances;
+}
+
+Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models) {
+  auto distances = measure(ground, models);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<float> least(ground.size());
+  for (std::size_t i = 0; i < least.size(); ++i) least[i] = ground.allowed_at(i);
+  for (const std::vector<float>& one : *distances) take_nearer(one, least);
+  double energy = 0;
+  for (std::size_t i = 0; i < least.size(); ++i) energy += ground.points.finite(ground.index(i)) ? static_cast<double>(least[i]) : 0.0;
+  return energy;
 }
 
 void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps) {

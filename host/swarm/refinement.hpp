@@ -80,7 +80,9 @@ Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::spa
 void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps);
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
-/// Refits every model to the points within tau of it while the energy falls; it never rises. Returns the energy.
+Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models);
+
+/// Refits every model to the points within tau of it while the joint energy falls; it never rises. Returns the energy.
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds = kMostRounds);
 
 /// For each model, the points within tau of it and of no other: what would be lost without it.

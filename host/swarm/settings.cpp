@@ -130,7 +130,7 @@ Settings preset(Preset preset) {
   }
   s.particles = 100;
   s.iterations = 100;
-  s.stall = 5;  // longer ones find no more: docs/fitting.md
+  s.stall = 10;
   s.topology = Topology::ring;
   s.local_share = 0.5;
   s.still = 1e-3;
@@ -139,9 +139,11 @@ Settings preset(Preset preset) {
   return s;
 }
 
-/// What a kind asks of the search beyond the preset, where the preset is free to choose.
+/// What a kind asks of the search beyond the preset, where the preset is free to choose. Figures: docs/fitting.md.
 Settings for_kind(Settings s, ModelType type) {
   if (!s.joint || type == ModelType::plane) return s;
+  constexpr int kSoon = 5;  // still steps after which swarms of these kinds find no more
+  if (type == ModelType::line2d || type == ModelType::circle2d || type == ModelType::homography) s.stall = kSoon;
   if (type == ModelType::line2d) {
     s.particles = 64;  // of two dimensions more of them find no more
     return s;
@@ -154,8 +156,6 @@ Settings for_kind(Settings s, ModelType type) {
   s.renewal_share = 0.75;
   s.patience = 2;
   s.prices = type == ModelType::homography ? LabelPrices{0.2, 7} : LabelPrices{0.25, 6};
-  // Samples of seven points are seldom of one body alone: more of them must be seen.
-  if (type == ModelType::fundamental) s.stall = 10;
   return s;
 }
 
@@ -165,9 +165,10 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   Settings s = for_kind(preset(options.preset), options.model);
   s.particles = options.particles.value_or(s.particles);
   s.iterations = options.iterations.value_or(s.iterations);
-  s.stall = options.stall.value_or(s.stall);
-  // Of a large cloud a swarm sees a part, and may miss what the whole shows.
-  constexpr int kPatienceOnPart = 3;
+  // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
+  // Such short swarms miss more, so one more of them may.
+  constexpr int kStallOnPart = 5, kPatienceOnPart = 3;
+  s.stall = options.stall.value_or(s.searches_part(finite_points) ? kStallOnPart : s.stall);
   if (s.searches_part(finite_points)) s.patience = kPatienceOnPart;
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
