@@ -26,8 +26,9 @@ LINE_ROWS = [
     ("fast", "the default", []),
     ("fast, parametric deflation", "Eq. (5) instead of sinking caps", ["--deflation", "parametric"]),
     ("fast, s = 3", "swarms end sooner", ["--stall", "3"]),
-    ("fast, s = 10", "later", ["--stall", "10"]),
-    ("fast, s = 20", "and later still", ["--stall", "20"]),
+    ("fast, s = 5", "the default for lines", ["--stall", "5"]),
+    ("fast, s = 10", "the default for planes", ["--stall", "10"]),
+    ("fast, s = 20", "and later", ["--stall", "20"]),
     ("fast, 32 particles", "", ["--particles", "32"]),
     ("fast, 200 particles", "", ["--particles", "200"]),
     ("fast, no flight", "random sampling, half of it local; the best refined", ["--particles", "1250", "--iterations", "1"]),
@@ -156,7 +157,8 @@ def real_table(binary, groups, seeds, folder):
 
 def real_files(data):
     groups = []
-    for folder, model, title in (("adelaide_h", "homography", "AdelaideRMF homographies"), ("adelaide_f", "fundamental", "AdelaideRMF fundamental matrices")):
+    pairs = (("adelaide_h", "homography", "AdelaideRMF homographies"), ("adelaide_f", "fundamental", "AdelaideRMF fundamental matrices"))
+    for folder, model, title in pairs:
         files = sorted((data / folder).glob("*.csv"))
         if files:
             groups.append((f"{title}, {len(files)} scenes", [(model, f) for f in files]))

@@ -4,8 +4,7 @@
   tools/breakdown.py BINARY [--trials 20] [--out docs/images/breakdown.svg]
 
 Breakdown: one line of 100 points, sigma 0.005, among more and more outliers in the unit square, threshold 2.5 sigma. It counts as found where
-some model has nine in ten of its points within the threshold; a model that has no such line is an invented one. Statistically lost is a
-line that no longer has more points than chance would line up somewhere else: there the true line itself fails the test that models must pass.
+some model has nine in ten of its points within the threshold; a model that has no such line is an invented one.
 Anytime: lines of the same kind among 700 outliers; what the models delivered so far save of the loss, over time. Needs numpy.
 """
 import argparse
