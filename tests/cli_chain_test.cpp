@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/cli_runner.hpp"
@@ -36,6 +37,20 @@ std::string two_planes() {
 std::string without_times(const std::string& text) {
   static const std::regex times(R"re("(found_at_ms|total|load|fit|popout|segment|recognise)":[-+.e0-9]+)re");
   return std::regex_replace(text, times, "\"$1\":0");
+}
+
+/// Debian's python3-skimage brings the pair.
+TEST(CliDemo, TheMotorcycleSticksOutOfTheFloor) {
+  if (!fs::exists("/usr/lib/python3/dist-packages/skimage/data/motorcycle_left.png")) GTEST_SKIP() << "python3-skimage is not installed";
+  const TemporaryFolder folder;
+  const Outcome outcome = run_swarmfit(folder, {"demo", "--motorcycle", "--out", "out", "--quiet"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const cv::Mat popout = cv::imread((folder / "out/popout.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_FALSE(popout.empty());
+  // Its rear wheel, its saddle, its engine and its front wheel, all taller together than a thing on a table.
+  for (const cv::Rect part :
+       {cv::Rect(130, 290, 60, 60), cv::Rect(200, 180, 60, 30), cv::Rect(340, 300, 50, 50), cv::Rect(600, 320, 50, 60)})
+    EXPECT_GT(cv::countNonZero(popout(part)), part.area() / 2) << part.x;
 }
 
 TEST(CliFit, FindsBothPlanesAndWritesWhatItSays) {

@@ -12,7 +12,7 @@ namespace swarmfit::perception {
 
 struct PopoutOptions {
   double min_height = 0.008;     ///< [m]
-  double max_height = 0.6;       ///< [m]
+  double max_height = 1.0;       ///< [m]
   double flood_step = 0.02;      ///< [m]
   std::size_t min_points = 300;  ///< of a group, at the cloud's own resolution
   int threads = 0;               ///< 0: as many as there are

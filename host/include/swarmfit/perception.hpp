@@ -33,7 +33,7 @@ struct PerceiveOptions {
   double horizontal_angle = 0.20;    ///< [rad] a supporting plane's normal is within this of the vertical, in (0, pi/2)
   double min_plane_share = 0.005;    ///< of the finite points a plane of reasonable size holds, in (0, 1)
   double min_height = 0.008;         ///< [m] a point sticks out when it is at least this far above its plane
-  double max_height = 0.6;           ///< [m] and at most this far
+  double max_height = 1.0;           ///< [m] and at most this far
   double flood_step = 0.02;          ///< [m] neighbours in the flood fill are at most this far apart
   std::size_t min_soi_points = 300;  ///< smaller groups are debris (for a 640 x 480 frame; scaled by the image's size)
   double soi_margin = 1.15;          ///< the bounding sphere is larger than the group by this factor, >= 1
