@@ -22,7 +22,7 @@ constexpr double kCoherent = 0.5;     // share of neighbours alike, beyond chanc
 constexpr int kCycles = 3;            // of expansions over all labels
 constexpr std::size_t kSmoothed = 6;  // nearest neighbours that a point would agree with
 
-/// A number that tells a set of points from others (Fowler, Noll and Vo's hash); not 0.
+/// A number that tells a set of points from others (Fowler, Noll and Vo's hash); odd.
 std::uint64_t mark_of(std::span<const std::uint32_t> points) {
   std::uint64_t mark = 14695981039346656037U;
   for (const std::uint32_t i : points) mark = (mark ^ (i + 1ULL)) * 1099511628211U;
@@ -114,8 +114,10 @@ Expected<bool> Labelling::refit(State& state) {
     for (std::size_t i = 0; i < part_.index().size(); ++i) {
       if (state.labels[i] == m + 1) own.push_back(part_.index()[i]);
     }
-    // Nobody else has changed for a model whose points have not.
-    if (std::exchange(next.fitted[m], mark_of(own)) == next.fitted[m]) continue;
+    // For a model whose points are as they were nothing changes, once it has been fitted to them twice: one fit may end before it settles.
+    const std::uint64_t twice = mark_of(own), once = twice - 1;
+    if (next.fitted[m] == twice) continue;
+    next.fitted[m] = next.fitted[m] == once ? twice : once;
     const std::vector<double> weight(own.size(), 1.0);
     if (!ground_.space.refine(ground_.points, {own, weight}, next.models[m])) next.models[m] = state.models[m];
     moved.push_back(m);

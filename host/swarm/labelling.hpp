@@ -49,7 +49,7 @@ class Labelling {
   struct State {
     std::vector<models::Position> models;
     std::vector<std::vector<float>> distances;  // of each model, one a point of the part
-    std::vector<std::uint64_t> fitted;          // of each model, what tells the points that it was last fitted to; 0 none
+    std::vector<std::uint64_t> fitted;          // of each model, what tells the points that it was last fitted to, and how often; 0 none
     std::vector<std::uint16_t> labels;          // one a point of the part
     double energy = 0;
   };
