@@ -30,9 +30,10 @@ rm -rf build/shared/packages build/shared/unpacked
 (cd build/shared && cpack -G DEB >cpack.log || { cat cpack.log >&2; exit 1; })
 package=$(ls build/shared/packages/*.deb)
 dpkg-deb --info "$package"
-dpkg-deb --contents "$package" | awk '{print $1, $3, $6, $7, $8}'
+contents=$(dpkg-deb --contents "$package")
+awk '{print $1, $3, $6, $7, $8}' <<<"$contents"
 for file in bin/swarmfit include/swarmfit/swarmfit.hpp lib/libswarmfit.so share/man/man1/swarmfit.1 share/bash-completion/completions/swarmfit; do
-  dpkg-deb --contents "$package" | grep -q " \./usr/$file" || { echo "the package lacks /usr/$file" >&2; exit 1; }
+  grep -q " \./usr/$file" <<<"$contents" || { echo "the package lacks /usr/$file" >&2; exit 1; }
 done
 dpkg-deb --extract "$package" build/shared/unpacked
 prefix=$root/build/shared/unpacked/usr
