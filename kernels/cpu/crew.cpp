@@ -1,5 +1,6 @@
 #include "kernels/cpu/crew.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -99,13 +100,14 @@ class Crew::Arena {
 // them, takes milliseconds.
 Crew::Crew(int threads)
     : helpers_(threads - 1), shared_(std::make_shared<Shared>()), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
-  if (arena_) call_helpers();
+  if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
 
 Crew::~Crew() { shared_->closing = true; }
 
-void Crew::call_helpers() {
-  while (shared_->awake.load(std::memory_order_relaxed) < helpers_) {
+void Crew::call_helpers(std::size_t wanted) {
+  const int most = static_cast<int>(std::min(wanted, static_cast<std::size_t>(helpers_)));
+  while (shared_->awake.load(std::memory_order_relaxed) < most) {
     shared_->awake.fetch_add(1);
     try {
       arena_->enqueue([shared = shared_] { shared->help(); });
@@ -129,7 +131,7 @@ void Crew::run(std::size_t tasks, Body body, void* context) {
   shared.failed.clear();
   shared.next.store(0, std::memory_order_relaxed);
   shared.work.fetch_add(1);
-  call_helpers();
+  call_helpers(tasks - 1);
   shared.take_tasks();
   shared.work.fetch_add(1);
   for (int looks = 0; shared.inside.load() > 0; ++looks) {

@@ -17,6 +17,8 @@ class Crew {
   Crew(const Crew&) = delete;
   Crew& operator=(const Crew&) = delete;
 
+  int threads() const noexcept { return helpers_ + 1; }
+
   /// body(context, task) for each task, in any order and on any thread. The first exception is thrown here, when all have ended.
   using Body = void (*)(void* context, std::size_t task);
   void run(std::size_t tasks, Body body, void* context);
@@ -25,7 +27,7 @@ class Crew {
   struct Shared;
   class Arena;
 
-  void call_helpers();
+  void call_helpers(std::size_t wanted);
 
   int helpers_;
   std::shared_ptr<Shared> shared_;

@@ -18,8 +18,8 @@ constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 /// Share of the residuals computed above which pruning pauses, for twice as long each time up to the longest pause.
 constexpr double kPoorShare = 0.8;
 constexpr int kLongestPause = 32;
-/// What a swarm is shared out in where it is pruned: enough to keep threads busy, large enough for register tiles.
-constexpr std::size_t kModelGroups = 6, kLeastGroup = 8;
+/// What a swarm is shared out in where it is pruned: groups enough to keep each thread busy, of models enough for register tiles.
+constexpr std::size_t kGroupsPerThread = 3, kLeastGroup = 8;
 
 struct Runs {
   explicit Runs(const PointStore& store) : points(store.finite()), tiles(store.tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
@@ -110,7 +110,8 @@ std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSw
 std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
   points.prepare_bounds(kernels_, summing);
   // Each model's blocks are looked at, and what must be touched of them is, by one thread from first to last.
-  const std::size_t size = std::clamp((swarm.count + kModelGroups - 1) / kModelGroups, kLeastGroup, kGroupModels);
+  const std::size_t wanted = kGroupsPerThread * workers();
+  const std::size_t size = std::clamp((swarm.count + wanted - 1) / wanted, kLeastGroup, kGroupModels);
   const std::size_t groups = (swarm.count + size - 1) / size;
   touched_.assign(groups, 0);
   const auto one = [&](std::size_t g) {

@@ -27,6 +27,9 @@ inline Crew*& current_crew() noexcept {
   return current;
 }
 
+/// Threads that tasks are shared out to where this is called.
+inline std::size_t workers() noexcept { return current_crew() != nullptr ? static_cast<std::size_t>(current_crew()->threads()) : 1; }
+
 /// body(task) for each task; one alone is done here. More than one run on the threads of the crew that this is called in, or of TBB where
 /// there is none.
 template <class Body>
