@@ -31,9 +31,14 @@ def language(path: Path) -> str:
 
 
 def listing(path: Path) -> list[str]:
-    """Files of a folder, as git knows them."""
+    """Files of a folder, as git knows them; where there is no git, all but what tools leave behind."""
     command = ["git", "-C", str(path), "ls-files", "--cached", "--others", "--exclude-standard"]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    try:
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    except (OSError, subprocess.CalledProcessError):
+        inside = (file.relative_to(path) for file in sorted(path.rglob("*")) if file.is_file())
+        left_behind = ("__pycache__", "node_modules")
+        return [str(file) for file in inside if not any(part in left_behind or part.startswith(".") for part in file.parts)]
 
 
 def pages(app: Sphinx) -> Iterator[tuple[str, dict[str, Any], str]]:
