@@ -22,6 +22,8 @@ using Clock = std::chrono::steady_clock;
 
 /// How long a helper without work looks for more: longer than whatever a fit does by itself between two passes over its points.
 constexpr auto kAwake = std::chrono::microseconds(1000);
+/// How long helpers are waited for at the end; they go as soon as they have a thread to go with.
+constexpr auto kPatience = std::chrono::seconds(1);
 /// Looks before a thread that waits lets others have its processor, each time it looks in vain.
 constexpr int kLooks = 2000;
 
@@ -80,7 +82,7 @@ struct Crew::Shared {
       if (Clock::now() - since > kAwake) break;
       if (looks > kLooks) std::this_thread::yield();
     }
-    awake.fetch_sub(1);
+    awake.fetch_sub(1);  // the last that it may touch: whoever waits for this ends what it belongs to
   }
 };
 
@@ -99,18 +101,28 @@ class Crew::Arena {
 // The arena is made here and not in the first fit, and its threads are called once: what TBB looks up about the machine, and starting
 // them, takes milliseconds.
 Crew::Crew(int threads)
-    : helpers_(threads - 1), shared_(std::make_shared<Shared>()), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
+    : helpers_(threads - 1), shared_(std::make_unique<Shared>()), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
   if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
 
-Crew::~Crew() { shared_->closing = true; }
+Crew::~Crew() {
+  shared_->closing = true;
+  const auto since = Clock::now();
+  while (shared_->awake.load() > 0) {
+    std::this_thread::yield();
+    if (Clock::now() - since < kPatience) continue;
+    // Those that TBB has found no thread for will look at it yet, should it ever find one.
+    static_cast<void>(shared_.release());
+    return;
+  }
+}
 
 void Crew::call_helpers(std::size_t wanted) {
   const int most = static_cast<int>(std::min(wanted, static_cast<std::size_t>(helpers_)));
   while (shared_->awake.load(std::memory_order_relaxed) < most) {
     shared_->awake.fetch_add(1);
     try {
-      arena_->enqueue([shared = shared_] { shared->help(); });
+      arena_->enqueue([shared = shared_.get()] { shared->help(); });
     } catch (...) {
       shared_->awake.fetch_sub(1);  // the caller alone does it as well
       return;
