@@ -93,7 +93,9 @@ try {
   for (const one of cases(folder)) {
     if (only && !only.includes(one.name)) continue;
     const page = join(folder, `${one.name}.html`);
-    execFileSync(resolve(command), [...one.arguments, '--report', page, '--quiet'], {cwd: folder, stdio: ['ignore', 'inherit', 'inherit']});
+    // The page is what is tested, on the back end that every machine has.
+    const options = ['--backend', 'cpu', '--report', page, '--quiet'];
+    execFileSync(resolve(command), [...one.arguments, ...options], {cwd: folder, stdio: ['ignore', 'inherit', 'inherit']});
     for (const [screen, options] of Object.entries(screensOf(Boolean(shots)))) {
       if (!shots && !one.screens.includes(screen)) continue;
       const started = Date.now();
