@@ -57,6 +57,13 @@ void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
 
 std::size_t width_of(ModelKind kind) { return static_cast<std::size_t>(traits(kind).coefficient_count); }
 
+/// `models` models of a swarm from `first` on.
+CentredSwarm part_of(const CentredSwarm& swarm, std::size_t first, std::size_t models) {
+  const std::size_t width = width_of(swarm.kind);
+  const auto cutoffs = swarm.cutoffs.empty() ? swarm.cutoffs : swarm.cutoffs.subspan(first, models);
+  return {swarm.kind, models, swarm.coefficients.subspan(first * width, models * width), swarm.finite.subspan(first, models), cutoffs};
+}
+
 /// Largest float that is not above `value`, and one less: sums in float and in double may differ in their last place.
 float below(double value) { return std::nextafter(static_cast<float>(value), 0.0F); }
 
@@ -117,8 +124,8 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
   const auto one = [&](std::size_t g) {
     // A thread's own from call to call: what another core wrote last is slow to get at.
     thread_local OpenGroup group;
-    const std::size_t first = g * size;
-    touched_[g] = group.evaluate(kernels_, points, swarm, summing, first, std::min(size, swarm.count - first), costs);
+    const std::size_t first = g * size, models = std::min(size, swarm.count - first);
+    touched_[g] = group.evaluate(kernels_, points, part_of(swarm, first, models), summing, costs.subspan(first, models));
   };
   if (worth_sharing(points.finite(), swarm.count)) {
     for_each_task(groups, one);
@@ -130,41 +137,41 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
 }
 
 std::uint64_t OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                                  std::size_t first, std::size_t models, std::span<float> costs) {
-  bound(kernels, points, swarm, summing.loss, first, models);
-  alive_.resize(models);
+                                  std::span<float> costs) {
+  bound(kernels, points, swarm, summing.loss);
+  alive_.resize(swarm.count);
   std::iota(alive_.begin(), alive_.end(), 0U);
   std::erase_if(alive_, [&](std::uint32_t j) {
-    if (swarm.finite[first + j]) return false;
-    costs[first + j] = std::numeric_limits<float>::infinity();
+    if (swarm.finite[j]) return false;
+    costs[j] = std::numeric_limits<float>::infinity();
     return true;
   });
   const auto drop_lost = [&] {
     std::erase_if(alive_, [&](std::uint32_t j) {
       const PartialBound& known = bounds_[j];
       const float least = below(static_cast<double>(known.settled) / static_cast<double>(summing.scale) + known.mixed + known.within);
-      if (swarm.cutoffs.empty() || !(least >= swarm.cutoffs[first + j])) return false;
-      costs[first + j] = least;
+      if (swarm.cutoffs.empty() || !(least >= swarm.cutoffs[j])) return false;
+      costs[j] = least;
       return true;
     });
   };
   touched_ = 0;
   // Blocks that straddle their caps are bounded loosest: they come first.
   drop_lost();
-  add(kernels, points, swarm, summing, first, models, &Open::mixed);
+  add(kernels, points, swarm, summing, &Open::mixed);
   for (const std::uint32_t j : alive_) bounds_[j].mixed = 0;
   drop_lost();
-  add(kernels, points, swarm, summing, first, models, &Open::within);
+  add(kernels, points, swarm, summing, &Open::within);
   for (const std::uint32_t j : alive_) {
-    costs[first + j] = static_cast<float>(static_cast<double>(bounds_[j].settled) / static_cast<double>(summing.scale));
+    costs[j] = static_cast<float>(static_cast<double>(bounds_[j].settled) / static_cast<double>(summing.scale));
   }
   return touched_;
 }
 
-void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss, std::size_t first,
-                      std::size_t models) {
+void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss) {
   const std::size_t width = width_of(swarm.kind);
-  const float* coefficients = swarm.coefficients.data() + first * width;
+  const float* coefficients = swarm.coefficients.data();
+  const std::size_t models = swarm.count;
   slack_.resize(models);
   for (std::size_t j = 0; j < models; ++j) slack_[j] = residual_rounding(swarm.kind, coefficients + j * width, points.reach().data());
   bounds_.assign(models, {});
@@ -175,19 +182,19 @@ void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const
 }
 
 void OpenGroup::add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                    std::size_t first, std::size_t models, std::uint8_t Open::*blocks) {
+                    std::uint8_t Open::*blocks) {
   if (alive_.empty()) return;
   const std::size_t width = width_of(swarm.kind);
   coefficients_.resize(alive_.size() * width);
   for (std::size_t a = 0; a < alive_.size(); ++a) {
-    std::copy_n(swarm.coefficients.data() + (first + alive_[a]) * width, width, coefficients_.data() + a * width);
+    std::copy_n(swarm.coefficients.data() + alive_[a] * width, width, coefficients_.data() + a * width);
   }
   sums_.assign(alive_.size(), {});
   std::array<std::uint8_t, kGroupModels> bits{};
   for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
     unsigned any = 0;
     for (std::size_t a = 0; a < alive_.size(); ++a) {
-      bits[a] = open_[tile * models + alive_[a]].*blocks;
+      bits[a] = open_[tile * swarm.count + alive_[a]].*blocks;
       any |= bits[a];
       touched_ += static_cast<std::uint64_t>(std::popcount(bits[a])) * kBlockPoints;
     }

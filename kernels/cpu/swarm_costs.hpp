@@ -23,17 +23,15 @@ struct CentredSwarm {
 /// A few models of a swarm over all points, whose blocks are looked at before any point is touched. Keeps its memory from call to call.
 class OpenGroup {
  public:
-  /// Fills the costs of `models` models from `first` on; returns how many residuals were computed. The points' bounds are prepared, the
-  /// form is exact.
+  /// Fills the costs; returns how many residuals were computed. The points' bounds are prepared, the form is exact.
   std::uint64_t evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                         std::size_t first, std::size_t models, std::span<float> costs);
+                         std::span<float> costs);
 
  private:
-  void bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss, std::size_t first,
-             std::size_t models);
+  void bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss);
   /// What blocks of one sort cost the models that are alive.
-  void add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::size_t first,
-           std::size_t models, std::uint8_t Open::*blocks);
+  void add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+           std::uint8_t Open::*blocks);
 
   std::vector<Open> open_;  ///< a tile and a model
   std::vector<float> slack_;

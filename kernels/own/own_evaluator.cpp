@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-
 #include "kernels/checks.hpp"
 #include "kernels/cpu/processor.hpp"
 #include "kernels/cpu/tasks.hpp"
