@@ -48,6 +48,28 @@ TEST_P(CrewOf, SeesWhatItsTasksWrote) {
   for (std::size_t task = 0; task < numbers.size(); ++task) ASSERT_EQ(numbers[task], task * (199 * 200 / 2));
 }
 
+TEST_P(CrewOf, GivesEachMemberToOneThread) {
+  Crew crew(GetParam());
+  const auto members = static_cast<std::size_t>(GetParam());
+  for (int again = 0; again < 200; ++again) {
+    // Were two threads the same member at a time, some of what they count would be lost.
+    std::vector<std::size_t> counts(members);
+    std::atomic<bool> beyond = false;
+    run_in(crew, true, [&] {
+      for_each_task_as_member(2000, [&](std::size_t, std::size_t member) {
+        if (member >= members) {
+          beyond = true;
+        } else {
+          ++counts[member];
+        }
+      });
+    });
+    ASSERT_FALSE(beyond);
+    ASSERT_EQ(std::accumulate(counts.begin(), counts.end(), std::size_t{0}), 2000U);
+    if (again % 50 == 49) std::this_thread::sleep_for(std::chrono::milliseconds(3));  // helpers go, and others come
+  }
+}
+
 TEST_P(CrewOf, ThrowsWhatATaskThrewAndGoesOn) {
   Crew crew(GetParam());
   for (int again = 0; again < 20; ++again) {

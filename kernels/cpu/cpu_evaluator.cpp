@@ -143,24 +143,15 @@ class CpuEvaluator final : public FitnessEvaluator {
  private:
   /// Coefficients in the frame of the stored points; false if one is not finite.
   bool centre(const ModelView& model, float* k) const {
-    std::array<double, kMaxCoefficients> wide{};
-    const bool finite = centred_coefficients(model.kind, model.parameters.data(), store_.centre(), wide.data());
-    // What float cannot hold is farther away than any point either way.
-    constexpr double most = 1e30;
-    for (std::size_t c = 0; c < wide.size(); ++c) k[c] = static_cast<float>(std::clamp(wide[c], -most, most));
-    return finite;
+    char finite = 0;
+    centred_coefficients(model.kind, 1, model.parameters.data(), store_.centre(), k, &finite);
+    return finite != 0;
   }
 
   void centre(const SwarmView& swarm) {
-    const auto rows = static_cast<std::size_t>(traits(swarm.kind).parameter_count);
-    const auto width = static_cast<std::size_t>(traits(swarm.kind).coefficient_count);
-    coefficients_.resize(swarm.count * width);
+    coefficients_.resize(swarm.count * static_cast<std::size_t>(traits(swarm.kind).coefficient_count));
     finite_.resize(swarm.count);
-    for (std::size_t j = 0; j < swarm.count; ++j) {
-      std::array<float, kMaxCoefficients> k{};
-      finite_[j] = centre(ModelView{swarm.kind, swarm.parameters.subspan(j * rows, rows)}, k.data());
-      for (std::size_t c = 0; c < width; ++c) coefficients_[j * width + c] = finite_[j] ? k[c] : 0.0F;
-    }
+    centred_coefficients(swarm.kind, swarm.count, swarm.parameters.data(), store_.centre(), coefficients_.data(), finite_.data());
   }
 
   void assign_tile(std::size_t tile, std::span<const ModelView> models,

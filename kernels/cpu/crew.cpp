@@ -7,6 +7,7 @@
 #include <exception>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include <hwy/base.h>
 #include <oneapi/tbb/task_arena.h>
@@ -40,37 +41,70 @@ void breathe() {
 struct Crew::Shared {
   Body body = nullptr;
   void* context = nullptr;
-  std::size_t tasks = 0;
   std::exception_ptr failure;
   std::atomic_flag failed;
 
-  alignas(64) std::atomic<std::size_t> next = 0;
+  /// The tasks that one member takes first: consecutive ones, the same each time where there are as many tasks. What they work on is then
+  /// in that thread's caches from the time before.
+  struct alignas(64) Share {
+    std::atomic<std::size_t> next = 0;
+    std::size_t end = 0;
+    std::atomic_flag taken;  ///< a helper is this member
+  };
+  std::vector<Share> shares;  ///< a member; the caller's first
+
   alignas(64) std::atomic<std::uint64_t> work = 0;  ///< number of the piece of work, odd while there is some
   alignas(64) std::atomic<int> inside = 0;
   std::atomic<int> awake = 0;  ///< helpers called and not gone
   std::atomic<bool> closing = false;
 
-  void take_tasks() {
-    for (std::size_t task = next.fetch_add(1, std::memory_order_relaxed); task < tasks;
-         task = next.fetch_add(1, std::memory_order_relaxed)) {
-      try {
-        body(context, task);
-      } catch (...) {
-        if (!failed.test_and_set()) failure = std::current_exception();
-        next.store(tasks, std::memory_order_relaxed);
+  explicit Shared(std::size_t threads) : shares(threads) {}
+
+  void share_out(std::size_t tasks) {
+    std::size_t begin = 0;
+    for (std::size_t s = 0; s < shares.size(); ++s) {
+      shares[s].next.store(begin, std::memory_order_relaxed);
+      begin = shares[s].end = tasks / shares.size() * (s + 1) + std::min(tasks % shares.size(), s + 1);
+    }
+  }
+
+  /// A thread's own share, then what others have not come to.
+  void take_tasks(std::size_t own) {
+    for (std::size_t s = 0; s < shares.size(); ++s) {
+      Share& share = shares[(own + s) % shares.size()];
+      while (share.next.load(std::memory_order_relaxed) < share.end) {
+        const std::size_t task = share.next.fetch_add(1, std::memory_order_relaxed);
+        if (task < share.end) do_one(task, own);
       }
     }
   }
 
+  void do_one(std::size_t task, std::size_t member) {
+    if (failed.test(std::memory_order_relaxed)) return;
+    try {
+      body(context, task, member);
+    } catch (...) {
+      if (!failed.test_and_set()) failure = std::current_exception();
+    }
+  }
+
+  /// There are no more helpers awake than members to be.
+  std::size_t become_member() {
+    std::size_t member = 1;
+    while (shares[member].taken.test_and_set(std::memory_order_acquire)) member = member % (shares.size() - 1) + 1;
+    return member;
+  }
+
   /// Helps with what there is and what comes, and goes when nothing has come for a while.
   void help() {
+    const std::size_t own = become_member();
     std::uint64_t done = 0;
     auto since = Clock::now();
     for (int looks = 0; !closing.load(std::memory_order_relaxed); ++looks) {
       const std::uint64_t seen = work.load(std::memory_order_acquire);
       if (seen % 2 == 1 && seen != done) {
         inside.fetch_add(1);
-        if (work.load() == seen) take_tasks();
+        if (work.load() == seen) take_tasks(own);
         inside.fetch_sub(1);
         done = seen;
         looks = 0;
@@ -82,6 +116,7 @@ struct Crew::Shared {
       if (Clock::now() - since > kAwake) break;
       if (looks > kLooks) std::this_thread::yield();
     }
+    shares[own].taken.clear(std::memory_order_release);
     awake.fetch_sub(1);  // the last that it may touch: whoever waits for this ends what it belongs to
   }
 };
@@ -101,7 +136,7 @@ class Crew::Arena {
 // The arena is made here and not in the first fit, and its threads are called once: what TBB looks up about the machine, and starting
 // them, takes milliseconds.
 Crew::Crew(int threads)
-    : helpers_(threads - 1), shared_(std::make_unique<Shared>()), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
+    : helpers_(threads - 1), shared_(std::make_unique<Shared>(static_cast<std::size_t>(threads))), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
   if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
 
@@ -133,18 +168,17 @@ void Crew::call_helpers(std::size_t wanted) {
 void Crew::run(std::size_t tasks, Body body, void* context) {
   if (tasks == 0) return;
   if (helpers_ == 0 || tasks == 1) {
-    for (std::size_t task = 0; task < tasks; ++task) body(context, task);
+    for (std::size_t task = 0; task < tasks; ++task) body(context, task, 0);
     return;
   }
   Shared& shared = *shared_;
   shared.body = body;
   shared.context = context;
-  shared.tasks = tasks;
   shared.failed.clear();
-  shared.next.store(0, std::memory_order_relaxed);
+  shared.share_out(tasks);
   shared.work.fetch_add(1);
   call_helpers(tasks - 1);
-  shared.take_tasks();
+  shared.take_tasks(0);
   shared.work.fetch_add(1);
   for (int looks = 0; shared.inside.load() > 0; ++looks) {
     breathe();

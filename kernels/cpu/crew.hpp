@@ -19,8 +19,9 @@ class Crew {
 
   int threads() const noexcept { return helpers_ + 1; }
 
-  /// body(context, task) for each task, in any order and on any thread. The first exception is thrown here, when all have ended.
-  using Body = void (*)(void* context, std::size_t task);
+  /// body(context, task, member) for each task, in any order and on any thread. No two threads are the same member, of `threads()`, at a
+  /// time; the caller is the first. The first exception is thrown here, when all have ended.
+  using Body = void (*)(void* context, std::size_t task, std::size_t member);
   void run(std::size_t tasks, Body body, void* context);
 
  private:

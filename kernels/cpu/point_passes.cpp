@@ -97,11 +97,9 @@ struct Bench {
 
   /// A model's coefficients about the pivot; false if one is not finite.
   bool centre(const ModelView& model, float* coefficients) const {
-    constexpr double kMost = 1e30;  // what float cannot hold is farther away than any point either way
-    std::array<double, kMaxCoefficients> wide{};
-    if (!centred_coefficients(model.kind, model.parameters.data(), pivot.data(), wide.data())) return false;
-    for (std::size_t c = 0; c < wide.size(); ++c) coefficients[c] = static_cast<float>(std::clamp(wide[c], -kMost, kMost));
-    return true;
+    char usable = 0;
+    centred_coefficients(model.kind, 1, model.parameters.data(), pivot.data(), coefficients, &usable);
+    return usable != 0;
   }
 
   /// For a model that cannot be evaluated: every distance is infinite. Returns its cost.

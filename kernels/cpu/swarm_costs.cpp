@@ -30,7 +30,7 @@ struct Runs {
   std::size_t points, tiles, length, count;
 };
 
-/// body(run, first model, models) for each run of tiles and group of models.
+/// body(run, first model, models, member) for each run of tiles and group of models.
 template <class Body>
 void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
   const std::size_t groups = (models + kGroupModels - 1) / kGroupModels;
@@ -40,18 +40,18 @@ void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
   const std::size_t even = groups > 0 ? (models + groups - 1) / groups : 0, size = (even + kMultiple - 1) / kMultiple * kMultiple;
   // Where there are runs enough for all threads, one thread takes all groups over a run while it is in its caches.
   const std::size_t parts = runs.count < kManyRuns ? groups : 1;
-  const auto one = [&](std::size_t task) {
+  const auto one = [&](std::size_t task, std::size_t member) {
     const std::size_t part = task % parts;
     for (std::size_t group = part; group < groups; group += parts) {
       const std::size_t first = group * size;
-      body(task / parts, first, std::min(size, models - first));
+      body(task / parts, first, std::min(size, models - first), member);
     }
   };
   const std::size_t tasks = groups > 0 ? runs.count * parts : 0;
   if (worth_sharing(runs.points, models)) {
-    for_each_task(tasks, one);
+    for_each_task_as_member(tasks, one);
   } else {
-    for (std::size_t task = 0; task < tasks; ++task) one(task);
+    for (std::size_t task = 0; task < tasks; ++task) one(task, 0);
   }
 }
 
@@ -93,22 +93,32 @@ bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, 
 std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
                                        std::span<float> costs) {
   const Runs runs(points);
-  partial_.resize(runs.count * swarm.count);
-  for_tasks(runs, swarm.count, [&](std::size_t run, std::size_t first, std::size_t models) {
-    PartialCost* const costs_of_run = partial_.data() + run * swarm.count + first;
-    std::fill_n(costs_of_run, models, PartialCost{});
+  const bool exact = summing.scale > 0;
+  sums_.resize(std::max(sums_.size(), exact ? workers() : runs.count));
+  ++swarm_;
+  const auto begin = [&](Sums& sums) {
+    sums.swarm = swarm_;
+    sums.costs.assign(swarm.count, {});
+  };
+  if (!exact) std::for_each_n(sums_.begin(), runs.count, begin);
+  for_tasks(runs, swarm.count, [&](std::size_t run, std::size_t first, std::size_t models, std::size_t member) {
+    Sums& sums = sums_[exact ? member : run];
+    if (exact && sums.swarm != swarm_) begin(sums);
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
       kernels_.add_costs(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
-                         costs_of_run);
+                         sums.costs.data() + first);
     }
   });
-  for (std::size_t j = 0; j < swarm.count; ++j) {
-    PartialCost total;
-    for (std::size_t run = 0; run < runs.count; ++run) {
-      total.units += partial_[run * swarm.count + j].units;
-      total.value += partial_[run * swarm.count + j].value;
+  totals_.assign(swarm.count, {});
+  for (const Sums& sums : sums_) {
+    if (sums.swarm != swarm_) continue;
+    for (std::size_t j = 0; j < swarm.count; ++j) {
+      totals_[j].units += sums.costs[j].units;
+      totals_[j].value += sums.costs[j].value;
     }
-    const double cost = summing.scale > 0 ? static_cast<double>(total.units) / static_cast<double>(summing.scale) : total.value;
+  }
+  for (std::size_t j = 0; j < swarm.count; ++j) {
+    const double cost = exact ? static_cast<double>(totals_[j].units) / static_cast<double>(summing.scale) : totals_[j].value;
     costs[j] = swarm.finite[j] ? static_cast<float>(cost) : std::numeric_limits<float>::infinity();
   }
   return points.finite() * swarm.count;

@@ -43,7 +43,8 @@ class OpenGroup {
 };
 
 /// Works in the caller's crew, where the work is worth_sharing. By brute force tiles are taken in runs and models in groups: each pair
-/// is a task and writes its own partial sums, which are added up in a fixed order. With pruning a group of models is a task.
+/// is a task. Where losses are summed in quanta each thread keeps sums of its own, else each run of tiles has some, which are added up in a
+/// fixed order. With pruning a group of models is a task.
 class SwarmCosts {
  public:
   SwarmCosts(const CpuKernels& kernels, bool pruning) : kernels_(kernels), pruning_(pruning) {}
@@ -63,7 +64,15 @@ class SwarmCosts {
   int pause_ = 0;  ///< evaluations to go before pruning is tried again
   int last_pause_ = 0;
 
-  std::vector<PartialCost> partial_;    ///< a run of tiles and a model
+  /// Of one thread or one run of tiles; begun anew with each swarm. What another core wrote is slow to get at,
+  /// so there are few, and each is written by one thread alone.
+  struct alignas(64) Sums {
+    std::uint64_t swarm = 0;
+    Aligned<PartialCost> costs;
+  };
+  std::vector<Sums> sums_;
+  std::vector<PartialCost> totals_;     ///< a model
+  std::uint64_t swarm_ = 0;             ///< number of the present one
   std::vector<std::uint64_t> touched_;  ///< a group of models
 };
 

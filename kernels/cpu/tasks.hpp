@@ -30,17 +30,27 @@ inline Crew*& current_crew() noexcept {
 /// Threads that tasks are shared out to where this is called.
 inline std::size_t workers() noexcept { return current_crew() != nullptr ? static_cast<std::size_t>(current_crew()->threads()) : 1; }
 
+/// body(task, member) for each task on the threads of the crew, which are members below `workers()`; here where there is none.
+template <class Body>
+void for_each_task_as_member(std::size_t tasks, Body&& body) {
+  if (Crew* crew = current_crew(); crew != nullptr) {
+    using Callable = std::remove_reference_t<Body>;
+    crew->run(
+        tasks, [](void* context, std::size_t task, std::size_t member) { (*static_cast<Callable*>(context))(task, member); },
+        const_cast<void*>(static_cast<const void*>(std::addressof(body))));
+  } else {
+    for (std::size_t task = 0; task < tasks; ++task) body(task, std::size_t{0});
+  }
+}
+
 /// body(task) for each task; one alone is done here. More than one run on the threads of the crew that this is called in, or of TBB where
 /// there is none.
 template <class Body>
 void for_each_task(std::size_t tasks, Body&& body) {
   if (tasks == 1) {
     body(std::size_t{0});
-  } else if (Crew* crew = current_crew(); crew != nullptr) {
-    using Callable = std::remove_reference_t<Body>;
-    crew->run(
-        tasks, [](void* context, std::size_t task) { (*static_cast<Callable*>(context))(task); },
-        const_cast<void*>(static_cast<const void*>(std::addressof(body))));
+  } else if (current_crew() != nullptr) {
+    for_each_task_as_member(tasks, [&](std::size_t task, std::size_t) { body(task); });
   } else if (tasks > 1) {
     tbb::parallel_for(std::size_t{0}, tasks, body);
   }

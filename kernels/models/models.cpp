@@ -31,6 +31,23 @@ bool centred_coefficients(ModelKind kind, const double* parameters, const double
   });
 }
 
+void centred_coefficients(ModelKind kind, std::size_t count, const double* parameters, const double* centre, float* coefficients,
+                          char* finite) noexcept {
+  constexpr double kMost = 1e30;
+  visit_model(kind, [&]<class M>() {
+    constexpr auto width = static_cast<std::size_t>(M::traits.parameter_count), own = static_cast<std::size_t>(M::traits.coefficient_count);
+    for (std::size_t j = 0; j < count; ++j, parameters += width, coefficients += own) {
+      double k[own];
+      M::centre(parameters, centre, k);
+      double probe = 0;  // stays 0 unless something is NaN or infinite
+      for (std::size_t p = 0; p < width; ++p) probe += parameters[p] * 0;
+      for (std::size_t c = 0; c < own; ++c) probe += k[c] * 0;
+      finite[j] = probe == 0;
+      for (std::size_t c = 0; c < own; ++c) coefficients[c] = probe == 0 ? static_cast<float>(std::clamp(k[c], -kMost, kMost)) : 0.0F;
+    }
+  });
+}
+
 float residual_rounding(ModelKind kind, const float* coefficients, const float* reach) noexcept {
   constexpr float kRounding = 2e-6F, kMost = 1e30F;
   return visit_model(kind, [&]<class M>() {

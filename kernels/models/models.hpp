@@ -58,6 +58,11 @@ std::optional<ModelKind> model_kind(std::string_view name) noexcept;
 /// finite.
 bool centred_coefficients(ModelKind kind, const double* parameters, const double* centre, double* coefficients) noexcept;
 
+/// The same of `count` models one after the other, for kernels in float; what float cannot hold is farther away than any point either way.
+/// coefficients: count x coefficient_count, zeros for a model that is not finite; finite: count.
+void centred_coefficients(ModelKind kind, std::size_t count, const double* parameters, const double* centre, float* coefficients,
+                          char* finite) noexcept;
+
 /// What rounding may do to a residual in float, its own or a block's, at points whose coordinates are at most `reach`. Bounded kinds only.
 float residual_rounding(ModelKind kind, const float* coefficients, const float* reach) noexcept;
 
