@@ -16,6 +16,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
+constexpr double kAlike = 0.02;   // share of their saving by which the bests of two swarms that found the same may differ
 constexpr int kFullRounds = 1;    // of refinement on all points, where it was done on a part of them before
 
 }  // namespace
@@ -119,10 +120,16 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     if (!stop_reason_.empty() || interrupted() || full()) break;
     if (auto done = adopt(model, on_model, result); !done) return done;
   }
+  static constexpr const char* kNothingPays = "complete: no further model pays for itself";
   int unpaid = 0;
+  double saving = 0;
   while (stop_reason_.empty()) {
     if (full()) {
       stop_reason_ = "max-models reached";
+      break;
+    }
+    if (too_few_left()) {
+      stop_reason_ = kNothingPays;
       break;
     }
     Candidate best;
@@ -137,12 +144,25 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     if (settings_.deflation == Deflation::parametric) landscapes_[best.kind].deflate_around(best.theta);
     if (*outcome == Outcome::complete) {
       stop_reason_ = "complete: the list of global bests is stable";
-    } else if (++unpaid >= settings_.patience) {
-      stop_reason_ = "complete: no further model pays for itself";
+    } else if (++unpaid >= settings_.patience || (unpaid > 1 && agree(best.saving, saving))) {
+      stop_reason_ = kNothingPays;
     }
+    saving = best.saving;
   }
   result.stop_reason = stop_reason_;
   return finish(result);
+}
+
+bool MultiModel::too_few_left() const {
+  // The paper's swarms end by themselves; and where labels are shared out, what a swarm in vain came to is on offer as well.
+  if (settings_.deflation == Deflation::parametric || shares_out() || kinds_.size() > 1) return false;
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * ground_.allowed_at(i) ? 1 : 0;
+  return left < settings_.min_inliers;
+}
+
+bool MultiModel::agree(double saving, double before) const noexcept {
+  return !shares_out() && kinds_.size() == 1 && std::abs(saving - before) <= kAlike * std::max(saving, before);
 }
 
 double MultiModel::loss_of_nothing(std::span<const float> caps) const {
@@ -211,6 +231,7 @@ Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span
   if (!flown) return tl::unexpected(flown.error());
   if (!*flown) return Outcome::interrupted;
   candidate.theta = swarm.best();
+  candidate.saving = scale_ - swarm.best_fitness();
   if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
   if (auto done = refine(candidate); !done) return tl::unexpected(done.error());
   if (pays(candidate.support, settings, space(candidate.kind).minimal_sample())) return Outcome::found;

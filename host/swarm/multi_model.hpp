@@ -76,6 +76,7 @@ class MultiModel {
     std::size_t kind = 0;
     models::Position theta;
     double loss = 0;
+    double saving = 0;             // of the swarm's best, on the points that were searched
     std::vector<float> distances;  // of all points
     Support support;
   };
@@ -124,6 +125,10 @@ class MultiModel {
   double loss_of_nothing(std::span<const float> caps) const;
   /// Distances or caps, one a point, in measures that make the threshold of each tau; in `room` where they are not so already.
   std::span<const float> levelled(std::span<const float> values, std::vector<float>& room) const;
+  /// Do fewer points remain unexplained than a model must have?
+  bool too_few_left() const;
+  /// Has a swarm in vain come to what the one before it came to?
+  bool agree(double saving, double before) const noexcept;
   bool full() const noexcept { return limits_.max_models > 0 && found_.size() >= limits_.max_models; }
   bool shares_out() const noexcept;
   /// Are points so few that each is looked at with those about it?

@@ -166,14 +166,14 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed
 
 Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
   constexpr std::uint16_t kSeveral = 65535;
-  auto distances = measure(ground, models);
-  if (!distances) return tl::unexpected(distances.error());
   std::vector<std::uint16_t> owner(ground.size(), 0);
+  std::vector<float> distances(ground.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
+    if (auto done = weigh(ground.of(*models[m].space), models[m].theta, {}, distances); !done) return tl::unexpected(done.error());
     const auto mine = static_cast<std::uint16_t>(m + 1);
     for (std::size_t i = 0; i < owner.size(); ++i) {
       const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;
-      owner[i] = (*distances)[m][i] <= ground.allowed_at(i) ? taken : owner[i];
+      owner[i] = distances[i] <= ground.allowed_at(i) ? taken : owner[i];
     }
   }
   std::vector<std::size_t> unique(models.size(), 0);

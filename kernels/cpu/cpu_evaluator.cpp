@@ -60,14 +60,11 @@ class CpuEvaluator final : public FitnessEvaluator {
 
   Result<> set_caps(std::span<const float> caps) override {
     if (auto ok = check_size("caps.size()", caps.size(), store_.count()); !ok) return ok;
-    for (std::size_t i = 0; i < store_.finite(); ++i) {
-      const std::size_t row = store_.input_index(i);
-      if (!(caps[row] >= 0 && caps[row] <= std::numeric_limits<float>::max())) {
-        return fail(Failure::Kind::invalid, fmt::format("caps[{}] is {}, must be finite and >= 0", row, caps[row]));
-      }
+    if (const auto row = store_.bad_cap(caps)) {
+      return fail(Failure::Kind::invalid, fmt::format("caps[{}] is {}, must be finite and >= 0", *row, caps[*row]));
     }
     costs_.forget();
-    run_in(crew_, worth_sharing(store_.count()), [&] { store_.set_caps(caps); });
+    run_in(crew_, worth_sharing_copy(store_.count()), [&] { store_.set_caps(caps); });
     return {};
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "kernels/cpu/tasks.hpp"
 
@@ -12,21 +13,25 @@ namespace {
 /// Rows a task reads. Fixed, so that the centre does not depend on the number of threads.
 constexpr std::size_t kChunkRows = 16384;
 
-/// Calls visit(row, values) for each finite row in [first, last), with `values` its columns as double.
-template <class S, class Visit>
+/// Calls visit(row, values) for each finite row in [first, last), with `values` its `Width` columns.
+template <class S, std::size_t Width, class Visit>
 void visit_finite(const PointsView& points, std::size_t first, std::size_t last, Visit&& visit) {
   const char* row_data = static_cast<const char*>(points.data) + first * points.stride;
-  const auto columns = static_cast<std::size_t>(points.dimension);
   for (std::size_t row = first; row < last; ++row, row_data += points.stride) {
-    std::array<S, kMaxDimension> raw{};
-    std::memcpy(raw.data(), row_data, columns * sizeof(S));
-    std::array<double, kMaxDimension> values;
-    bool finite = true;
-    for (std::size_t c = 0; c < kMaxDimension; ++c) {
-      values[c] = static_cast<double>(raw[c]);
-      finite = finite && std::isfinite(raw[c]);
-    }
-    if (finite) visit(row, values);
+    std::array<S, Width> raw;
+    std::memcpy(raw.data(), row_data, sizeof raw);
+    S probe = 0;  // stays 0 unless a column is NaN or infinite
+    for (const S value : raw) probe += value * 0;
+    if (probe == 0) visit(row, raw);
+  }
+}
+
+template <class S, class Visit>
+void visit_rows(const PointsView& points, std::size_t first, std::size_t last, Visit&& visit) {
+  switch (points.dimension) {
+    case 2: return visit_finite<S, 2>(points, first, last, visit);
+    case 3: return visit_finite<S, 3>(points, first, last, visit);
+    default: return visit_finite<S, 4>(points, first, last, visit);
   }
 }
 
@@ -34,8 +39,8 @@ template <class Visit>
 void visit_chunk(const PointsView& points, std::size_t chunk, Visit&& visit) {
   const std::size_t first = chunk * kChunkRows;
   const std::size_t last = std::min(points.count, first + kChunkRows);
-  if (points.scalar == Scalar::float32) return visit_finite<float>(points, first, last, visit);
-  visit_finite<double>(points, first, last, visit);
+  if (points.scalar == Scalar::float32) return visit_rows<float>(points, first, last, visit);
+  visit_rows<double>(points, first, last, visit);
 }
 
 }  // namespace
@@ -48,9 +53,9 @@ void PointStore::assign(const PointsView& points) {
   std::vector<Chunk> chunks((count_ + kChunkRows - 1) / kChunkRows);
   for_each_task(chunks.size(), [&](std::size_t chunk) {
     Chunk summary;
-    visit_chunk(points, chunk, [&](std::size_t, const std::array<double, kMaxDimension>& x) {
+    visit_chunk(points, chunk, [&](std::size_t, const auto& x) {
       ++summary.finite;
-      for (std::size_t c = 0; c < kMaxDimension; ++c) summary.sum[c] += x[c];
+      for (std::size_t c = 0; c < x.size(); ++c) summary.sum[c] += static_cast<double>(x[c]);
     });
     chunks[chunk] = summary;
   });
@@ -78,15 +83,20 @@ void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunk
   input_.resize(finite_ == count_ ? 0 : finite_);
   for_each_task(chunks.size(), [&](std::size_t chunk) {
     std::size_t position = chunks[chunk].start;
-    visit_chunk(points, chunk, [&](std::size_t row, const std::array<double, kMaxDimension>& x) {
-      for (std::size_t c = 0; c < width; ++c) {
-        const auto centred = static_cast<float>(x[c] - centre_[c]);
-        columns_[c][position] = centred;
-        chunks[chunk].reach[c] = std::max(chunks[chunk].reach[c], std::abs(centred));
+    std::array<float, kMaxDimension> reach{};
+    std::array<float*, kMaxDimension> columns{};
+    for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
+    std::uint32_t* const input = input_.empty() ? nullptr : input_.data();
+    visit_chunk(points, chunk, [&](std::size_t row, const auto& x) {
+      for (std::size_t c = 0; c < x.size(); ++c) {
+        const auto centred = static_cast<float>(static_cast<double>(x[c]) - centre_[c]);
+        columns[c][position] = centred;
+        reach[c] = std::max(reach[c], std::abs(centred));
       }
-      if (!input_.empty()) input_[position] = static_cast<std::uint32_t>(row);
+      if (input != nullptr) input[position] = static_cast<std::uint32_t>(row);
       ++position;
     });
+    chunks[chunk].reach = reach;
   });
   reach_ = {};
   for (const Chunk& chunk : chunks) {
@@ -120,14 +130,37 @@ void PointStore::sort() {
   }
 }
 
+std::optional<std::size_t> PointStore::bad_cap(std::span<const float> caps) const noexcept {
+  const auto good = [](float cap) { return cap >= 0 && cap <= std::numeric_limits<float>::max(); };
+  if (input_.empty()) {
+    bool all = true;
+    for (std::size_t i = 0; i < finite_; ++i) all &= good(caps[i]);
+    if (all) return std::nullopt;
+  }
+  for (std::size_t i = 0; i < finite_; ++i) {
+    if (!good(caps[input_index(i)])) return input_index(i);
+  }
+  return std::nullopt;
+}
+
 void PointStore::set_caps(std::span<const float> caps) {
   bounds_current_ = false;
   std::vector<float> most((finite_ + kChunkRows - 1) / kChunkRows);
   for_each_task(most.size(), [&](std::size_t chunk) {
-    for (std::size_t i = chunk * kChunkRows; i < std::min(finite_, (chunk + 1) * kChunkRows); ++i) {
-      caps_[i] = caps[input_index(i)];
-      most[chunk] = std::max(most[chunk], caps_[i]);
+    const std::size_t first = chunk * kChunkRows, last = std::min(finite_, first + kChunkRows);
+    float most_here = 0;
+    if (input_.empty()) {
+      for (std::size_t i = first; i < last; ++i) {
+        caps_[i] = caps[i];
+        most_here = std::max(most_here, caps[i]);
+      }
+    } else {
+      for (std::size_t i = first; i < last; ++i) {
+        caps_[i] = caps[input_[i]];
+        most_here = std::max(most_here, caps_[i]);
+      }
     }
+    most[chunk] = most_here;
   });
   most_cap_ = most.empty() ? 0.0F : *std::max_element(most.begin(), most.end());
 }

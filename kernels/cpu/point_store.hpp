@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -21,6 +22,8 @@ class PointStore {
  public:
   /// Runs inside the caller's crew, as all that follows. The points must be valid (check_points).
   void assign(const PointsView& points);
+  /// Where the first cap of a kept point that is not finite, or negative, stands in the input.
+  std::optional<std::size_t> bad_cap(std::span<const float> caps) const noexcept;
   /// One cap a point, in input order; size and values must be valid.
   void set_caps(std::span<const float> caps);
   /// How losses are to be summed under the caps.

@@ -18,6 +18,8 @@ inline constexpr std::size_t kTaskPoints = 2048;
 
 /// Is a pass over so many points worth sharing between threads?
 constexpr bool worth_sharing(std::size_t points) noexcept { return points > kTaskPoints; }
+/// Is a pass that does no more than copy them?
+constexpr bool worth_sharing_copy(std::size_t points) noexcept { return points > 16 * kTaskPoints; }
 /// Are so many residuals?
 constexpr bool worth_sharing(std::size_t points, std::size_t models) noexcept { return points * models > std::size_t{1} << 17; }
 
