@@ -457,5 +457,45 @@ TEST(Fitter, TheReferenceBackEndAgreesWithTheCpu) {
   EXPECT_LE(differing, cpu->labels.size() / 1000);
 }
 
+/// Swarms that a fit flies.
+std::size_t swarms_flown(std::span<const float> rows, FitResult& result) {
+  auto fitter = Fitter::create({});
+  std::size_t swarms = 0;
+  fitter->observe([&](const SwarmStep& step) { swarms = std::max(swarms, step.swarm + 1); });
+  auto fitted = fitter->fit(PointsView(rows, 3));
+  EXPECT_TRUE(fitted) << fitted.error().message;
+  result = std::move(fitted).value_or(FitResult{});
+  return swarms;
+}
+
+/// Points of the plane z = `height`, scattered by a millimetre, over a square metre at most.
+void add_level(std::vector<float>& rows, std::mt19937& engine, float height, float side, int count) {
+  std::uniform_real_distribution<float> unit(0, 1);
+  std::normal_distribution<float> noise(0, 0.001F);
+  for (int i = 0; i < count; ++i) rows.insert(rows.end(), {side * unit(engine), side * unit(engine), height + noise(engine)});
+}
+
+TEST(Fit, FliesNoSwarmOverWhatIsExplained) {
+  std::mt19937 engine(5);
+  std::vector<float> rows;
+  add_level(rows, engine, 0, 1, 20000);
+  FitResult result;
+  EXPECT_EQ(swarms_flown(rows, result), 1U);
+  EXPECT_EQ(result.models.size(), 1U);
+  EXPECT_EQ(result.stop_reason, "complete: no further model pays for itself");
+}
+
+TEST(Fit, EndsWhenTwoSwarmsFindTheSameInVain) {
+  std::mt19937 engine(6);
+  std::uniform_real_distribution<float> unit(0.1F, 1);
+  std::vector<float> rows;
+  add_level(rows, engine, 0, 1, 20000);
+  add_level(rows, engine, 1.5F, 0.2F, 150);  // a surface, but less than one point in a hundred
+  for (int i = 0; i < 250; ++i) rows.insert(rows.end(), {unit(engine), unit(engine), unit(engine)});
+  FitResult result;
+  EXPECT_EQ(swarms_flown(rows, result), 3U) << "one that finds the plane, and two";
+  EXPECT_EQ(result.models.size(), 1U);
+}
+
 }  // namespace
 }  // namespace swarmfit
