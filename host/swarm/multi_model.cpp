@@ -231,7 +231,7 @@ Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span
   if (!flown) return tl::unexpected(flown.error());
   if (!*flown) return Outcome::interrupted;
   candidate.theta = swarm.best();
-  candidate.saving = scale_ - swarm.best_fitness();
+  candidate.saving = swarm.saving();
   if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
   if (auto done = refine(candidate); !done) return tl::unexpected(done.error());
   if (pays(candidate.support, settings, space(candidate.kind).minimal_sample())) return Outcome::found;

@@ -8,7 +8,7 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr int kCellBits = 16;  // of a column
+constexpr int kCellBits = 11;  // of a column: a thousandth of the spread
 
 /// Every bit of a byte followed by `gap` zeros.
 constexpr std::array<std::uint32_t, 256> spread_bytes(int gap) {
@@ -65,6 +65,16 @@ std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, 
   return index;
 }
 
+constexpr std::size_t kUsual = 3 * sizeof(float);  // bytes of a row, which a copy of known size is quickest for
+
+template <std::size_t Bytes>
+void copy_rows(const std::byte* from, std::size_t stride, std::span<const std::uint32_t> index, std::byte* to) {
+  for (const std::uint32_t i : index) {
+    std::memcpy(to, from + i * stride, Bytes);
+    to += Bytes;
+  }
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size) {
@@ -73,14 +83,19 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
   models::FiniteWalk walk = points.walk();
   // Run k begins at floor(n k / runs).
   const std::size_t whole = runs > 0 ? n / runs : 0, rest = runs > 0 ? n % runs : 0;
+  // Where runs are short half a word tells a point: as even as one can see, for half the random numbers.
+  constexpr std::size_t kShort = 1024;
+  const std::uint32_t per_word = whole < kShort ? 2 : 1, per_block = 4 * per_word;
   std::array<std::uint32_t, 4> words{};
   std::size_t from = 0, over = 0;
   for (std::size_t k = 0; k < runs; ++k) {
-    if (k % 4 == 0 && runs < n) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / 4));
+    const auto at = static_cast<std::uint32_t>(k % per_block);
+    if (at == 0 && runs < n) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / per_block));
     over += rest;
     const std::size_t length = whole + (over >= runs ? 1 : 0);
     if (over >= runs) over -= runs;
-    drawn[k] = walk.to(from + Random::below(words[k % 4], length));
+    const std::uint32_t word = per_word == 1 ? words[at] : (words[at / 2] << (at % 2 * 16)) & 0xFFFF0000U;
+    drawn[k] = walk.to(from + Random::below(word, length));
     from += length;
   }
   return drawn;
@@ -91,8 +106,11 @@ Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> ind
       dimension_(points.dimension),
       width_(static_cast<std::size_t>(points.dimension) * (points.scalar == kernels::Scalar::float32 ? sizeof(float) : sizeof(double))),
       bytes_(index.size() * width_) {
-  for (std::size_t k = 0; k < index.size(); ++k) {
-    std::memcpy(bytes_.data() + k * width_, static_cast<const std::byte*>(points.data) + index[k] * points.stride, width_);
+  const auto* const from = static_cast<const std::byte*>(points.data);
+  if (width_ == kUsual) {
+    copy_rows<kUsual>(from, points.stride, index, bytes_.data());
+  } else {
+    for (std::size_t k = 0; k < index.size(); ++k) std::memcpy(bytes_.data() + k * width_, from + index[k] * points.stride, width_);
   }
 }
 

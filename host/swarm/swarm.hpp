@@ -36,9 +36,11 @@ class Swarm {
   /// Scores every particle, then moves it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
   Expected<> step(Landscape& landscape, const Sampler& sampler, double scale);
 
-  bool converged() const noexcept { return still_steps_ >= settings_.stall; }
+  bool converged() const noexcept { return still_steps_ >= (saving() > settings_.paid ? settings_.stall_paid : settings_.stall); }
   int steps() const noexcept { return steps_; }
   const models::Position& best() const noexcept { return list_.back().position; }
+  /// Of the best, against a model that explains nothing.
+  double saving() const noexcept { return list_.empty() ? 0.0 : scale_ - list_.back().fitness; }
   double best_fitness() const noexcept { return list_.back().fitness; }
   /// The last n global bests, oldest first.
   const std::deque<GlobalBest>& global_bests() const noexcept { return list_; }

@@ -482,7 +482,9 @@ const CpuKernels& kernel_table() {
                                 split,
                                 sum_all,
                                 weigh,
+                                begin_claim,
                                 claim,
+                                end_claim,
                                 sum_labelled,
                                 spin_fma};
   return table;

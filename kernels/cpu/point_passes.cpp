@@ -114,9 +114,10 @@ struct Bench {
   }
 
   void add(const StripSums& sums, Evidence& evidence) const {
+    evidence.cost += sums.cost;
+    if (!(sums.weight > 0)) return;
     evidence.count += static_cast<std::uint64_t>(sums.count);
     evidence.square += sums.square;
-    evidence.cost += sums.cost;
     evidence.moments.add(moments(sums));
   }
 
@@ -239,10 +240,8 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
     }
     alignas(64) std::array<float, kStripPoints> nearest, told;
     alignas(64) std::array<std::int32_t, kStripPoints> label;
-    label.fill(0);
+    kernels_.begin_claim(bench.strip, beyond, nearest.data(), label.data());
     bench.claimants.clear();
-    nearest.fill(-1.0F);
-    for (std::size_t i = 0; i < bench.count; ++i) nearest[i] = bench.strip.limit[i] >= 0 ? beyond : -1.0F;
     const auto width = static_cast<std::size_t>(points.dimension);
     Evidence* const of_run = evidence_.data() + run * models.size();
     for (std::size_t m = 0; m < models.size(); ++m) {
@@ -255,7 +254,7 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
                                           nearest.data(), label.data(), of_run[m].cost);
       if (claimed) bench.claimants.push_back(m);
     }
-    for (std::size_t i = 0; i < bench.count; ++i) labels[bench.first + i] = static_cast<std::uint16_t>(label[i]);
+    kernels_.end_claim(label.data(), bench.count, labels.data() + bench.first);
     for (const std::size_t m : bench.claimants) {
       StripSums sums;
       kernels_.sum_labelled(bench.strip, width, static_cast<std::int32_t>(m + 1), nearest.data(), label.data(), sums);

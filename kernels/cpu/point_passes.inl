@@ -146,14 +146,15 @@ HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficie
     const Vector distance = hn::Abs(Model::residual(VectorMath(), x, k));
     cost = hn::Add(cost, hn::Max(least(distance, limit), zero));
     const auto speaks = hn::And(hn::Le(distance, widest), hn::Le(distance, limit));
-    all.count = hn::Add(all.count, hn::IfThenElseZero(speaks, one));
-    all.square = hn::Add(all.square, hn::IfThenElseZero(speaks, hn::Mul(distance, distance)));
-    // A distance of 0 divides to infinity, and the corner is less.
-    all.add(x, hn::IfThenElseZero(speaks, hn::Min(hn::Div(widest, distance), most)));
     if (distances != nullptr) {
       const Vector told = hn::IfThenElse(hn::Ge(limit, zero), distance, hn::Set(d, std::numeric_limits<float>::quiet_NaN()));
       hn::StoreU(told, d, distances + i);
     }
+    if (hn::AllFalse(d, speaks)) continue;
+    all.count = hn::Add(all.count, hn::IfThenElseZero(speaks, one));
+    all.square = hn::Add(all.square, hn::IfThenElseZero(speaks, hn::Mul(distance, distance)));
+    // A distance of 0 divides to infinity, and the corner is less.
+    all.add(x, hn::IfThenElseZero(speaks, hn::Min(hn::Div(widest, distance), most)));
   }
   all.finish(sums);
   sums.cost = static_cast<double>(hn::GetLane(hn::SumOfLanes(d, cost)));
@@ -162,6 +163,24 @@ HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficie
 void weigh(ModelKind kind, const Strip& strip, const float* coefficients, float tolerance, float corner, StripSums& sums,
            float* distances) {
   visit_model(kind, [&]<class Model>() HWY_ATTR { weigh_of<Model>(strip, coefficients, tolerance, corner, sums, distances); });
+}
+
+void begin_claim(const Strip& strip, float beyond, float* HWY_RESTRICT nearest, std::int32_t* HWY_RESTRICT labels) {
+  const FloatTag d;
+  const BitsTag bits;
+  for (std::size_t i = 0; i < strip.count; i += lanes()) {
+    const auto there = hn::Ge(hn::Load(d, strip.limit.data() + i), hn::Zero(d));
+    hn::Store(hn::IfThenElse(there, hn::Set(d, beyond), hn::Set(d, -1.0F)), d, nearest + i);
+    hn::Store(hn::Zero(bits), bits, labels + i);
+  }
+}
+
+void end_claim(const std::int32_t* HWY_RESTRICT labels, std::size_t count, std::uint16_t* HWY_RESTRICT out) {
+  const BitsTag bits;
+  const hn::Rebind<std::uint16_t, BitsTag> narrow;
+  const std::size_t whole = count - count % lanes();
+  for (std::size_t i = 0; i < whole; i += lanes()) hn::StoreU(hn::DemoteTo(narrow, hn::Load(bits, labels + i)), narrow, out + i);
+  for (std::size_t i = whole; i < count; ++i) out[i] = static_cast<std::uint16_t>(labels[i]);
 }
 
 template <class Model>
