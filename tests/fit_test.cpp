@@ -490,8 +490,8 @@ TEST(Fit, EndsWhenTwoSwarmsFindTheSameInVain) {
   std::uniform_real_distribution<float> unit(0.1F, 1);
   std::vector<float> rows;
   add_level(rows, engine, 0, 1, 20000);
-  add_level(rows, engine, 1.5F, 0.2F, 150);  // a surface, but less than one point in a hundred
-  for (int i = 0; i < 250; ++i) rows.insert(rows.end(), {unit(engine), unit(engine), unit(engine)});
+  add_level(rows, engine, 1.5F, 0.2F, 180);  // a surface, but less than one point in a hundred
+  for (int i = 0; i < 150; ++i) rows.insert(rows.end(), {unit(engine), unit(engine), unit(engine)});
   FitResult result;
   EXPECT_EQ(swarms_flown(rows, result), 3U) << "one that finds the plane, and two";
   EXPECT_EQ(result.models.size(), 1U);

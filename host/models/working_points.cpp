@@ -1,5 +1,6 @@
 #include "host/models/working_points.hpp"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -49,10 +50,30 @@ constexpr std::size_t kWord = 64;
 /// Most words of a dense cloud are full.
 std::size_t ones(std::uint64_t bits) { return bits == ~std::uint64_t{0} ? kWord : static_cast<std::size_t>(std::popcount(bits)); }
 
-/// Which bit of a word is the one after `before` others, of at least that many.
+constexpr std::uint64_t kEachByte = 0x0101010101010101U, kHighBits = 0x8080808080808080U;
+
+/// Place of the (r+1)th set bit of a byte.
+constexpr std::array<std::array<std::uint8_t, 8>, 256> places_in_byte() {
+  std::array<std::array<std::uint8_t, 8>, 256> places{};
+  for (unsigned byte = 0; byte < 256; ++byte) {
+    unsigned rank = 0;
+    for (unsigned bit = 0; bit < 8; ++bit) {
+      if ((byte >> bit & 1U) != 0) places[byte][rank++] = static_cast<std::uint8_t>(bit);
+    }
+  }
+  return places;
+}
+constexpr auto kPlaces = places_in_byte();
+
+/// Which bit of a word is the one after `before` others, of at least that many: its byte by counts side by side, and its place there.
 std::size_t bit_after(std::uint64_t bits, std::size_t before) {
-  for (; before > 0; --before) bits &= bits - 1;
-  return static_cast<std::size_t>(std::countr_zero(bits));
+  std::uint64_t counts = bits - (bits >> 1 & 0x5555555555555555U);
+  counts = (counts & 0x3333333333333333U) + (counts >> 2 & 0x3333333333333333U);
+  counts = ((counts + (counts >> 4)) & 0x0F0F0F0F0F0F0F0FU) * kEachByte;  // of each byte and those below it
+  const std::uint64_t passed = ((before * kEachByte | kHighBits) - counts) & kHighBits;
+  const auto byte = static_cast<std::size_t>((passed >> 7) * kEachByte >> 56);
+  const std::size_t below = byte > 0 ? counts >> (8 * byte - 8) & 0xFFU : 0;
+  return 8 * byte + kPlaces[bits >> (8 * byte) & 0xFFU][before - below];
 }
 
 }  // namespace

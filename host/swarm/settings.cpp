@@ -135,7 +135,7 @@ Settings preset(Preset preset) {
   s.local_share = 0.5;
   s.still = 1e-3;
   s.search_points = 8192;
-  s.fit_points = 32768;
+  s.fit_points = 16384;
   return s;
 }
 
@@ -169,7 +169,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   // Such short swarms miss more, so one more of them may.
   constexpr int kStallOnPart = 5, kPatienceOnPart = 3;
   // And where there is a model to take, refinement brings it the rest of the way: a hundredth of the saving is for that.
-  constexpr int kStallPaid = 3;
+  constexpr int kStallPaid = 3, kFlatOnPart = 64;
   constexpr double kStillOnPart = 0.01;
   const bool on_part = s.searches_part(finite_points);
   s.stall = options.stall.value_or(on_part ? kStallOnPart : s.stall);
@@ -177,6 +177,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   if (on_part) {
     s.patience = kPatienceOnPart;
     s.still = kStillOnPart;
+    if (options.model == ModelType::plane) s.particles = options.particles.value_or(kFlatOnPart);
   }
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);

@@ -8,7 +8,8 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr int kCellBits = 11;  // of a column: a thousandth of the spread
+constexpr int kCellBits = 16;        // of a column
+constexpr int kSampleCellBits = 11;  // where a part of the cloud is sorted, whose points are farther apart: three digits instead of five
 
 /// Every bit of a byte followed by `gap` zeros.
 constexpr std::array<std::uint32_t, 256> spread_bytes(int gap) {
@@ -22,14 +23,14 @@ constexpr std::array<std::array<std::uint32_t, 256>, models::kMaxDimension> kSpr
                                                                                     spread_bytes(3)};
 
 /// Interleaves the bits of the quantised columns.
-std::uint64_t morton(const models::WorkingPoints& points, std::size_t i) {
+std::uint64_t morton(const models::WorkingPoints& points, std::size_t i, int bits) {
   const int dim = points.dimension();
   const auto& spread = kSpread[static_cast<std::size_t>(dim - 1)];
   std::uint64_t code = 0;
   for (int d = 0; d < dim; ++d) {
     // The working frame has unit spread: +-4 holds all but far outliers, which are clamped.
     const double t = std::clamp((points.at(i, d) + 4.0) / 8.0, 0.0, 1.0);
-    const auto cell = static_cast<std::uint32_t>(t * ((1U << kCellBits) - 1U));
+    const auto cell = static_cast<std::uint32_t>(t * ((1U << bits) - 1U));
     const std::uint64_t low = spread[cell & 255U], high = spread[cell >> 8];
     code |= (high << (8 * dim) | low) << (dim - 1 - d);
   }
@@ -57,9 +58,10 @@ void sort_by_code(std::vector<Coded>& coded, int bits) {
 }
 
 std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part) {
+  const int bits = part.size() < points.finite_count() ? kSampleCellBits : kCellBits;
   std::vector<Coded> coded(part.size());
-  std::transform(part.begin(), part.end(), coded.begin(), [&](std::uint32_t i) { return Coded{morton(points, i), i}; });
-  sort_by_code(coded, kCellBits * points.dimension());
+  std::transform(part.begin(), part.end(), coded.begin(), [&](std::uint32_t i) { return Coded{morton(points, i, bits), i}; });
+  sort_by_code(coded, bits * points.dimension());
   std::vector<std::uint32_t> index(coded.size());
   std::transform(coded.begin(), coded.end(), index.begin(), [](const Coded& one) { return one.index; });
   return index;
@@ -85,18 +87,25 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
   const std::size_t whole = runs > 0 ? n / runs : 0, rest = runs > 0 ? n % runs : 0;
   // Where runs are short half a word tells a point: as even as one can see, for half the random numbers.
   constexpr std::size_t kShort = 1024;
-  const std::uint32_t per_word = whole < kShort ? 2 : 1, per_block = 4 * per_word;
-  std::array<std::uint32_t, 4> words{};
+  const bool halves = whole < kShort;
+  std::array<std::uint32_t, 8> words{};
   std::size_t from = 0, over = 0;
-  for (std::size_t k = 0; k < runs; ++k) {
-    const auto at = static_cast<std::uint32_t>(k % per_block);
-    if (at == 0 && runs < n) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(k / per_block));
-    over += rest;
-    const std::size_t length = whole + (over >= runs ? 1 : 0);
-    if (over >= runs) over -= runs;
-    const std::uint32_t word = per_word == 1 ? words[at] : (words[at / 2] << (at % 2 * 16)) & 0xFFFF0000U;
-    drawn[k] = walk.to(from + Random::below(word, length));
-    from += length;
+  std::uint32_t block = 0;
+  for (std::size_t k = 0; k < runs; ++block) {
+    const auto four = runs < n ? random.words(Draw::subset, number, 0, block) : std::array<std::uint32_t, 4>{};
+    for (std::size_t w = 0; w < 4; ++w) {
+      words[halves ? 2 * w : w] = four[w];
+      if (halves) words[2 * w + 1] = four[w] << 16;
+    }
+    const std::size_t last = std::min(runs, k + (halves ? 8 : 4));
+    for (std::size_t w = 0; k < last; ++k, ++w) {
+      over += rest;
+      const bool longer = over >= runs;
+      over -= longer ? runs : 0;
+      const std::size_t length = whole + (longer ? 1 : 0);
+      drawn[k] = walk.to(from + Random::below(words[w], length));
+      from += length;
+    }
   }
   return drawn;
 }
