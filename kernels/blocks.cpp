@@ -43,8 +43,10 @@ std::vector<std::uint32_t> spread_table(int dimensions, int bits) {
   return table;
 }
 
-/// Jacobi rotations: `matrix` becomes diagonal, the columns of `axes` its eigenvectors.
-void diagonalise(std::array<std::array<double, 3>, 3>& matrix, std::array<std::array<double, 3>, 3>& axes, int dimension) {
+}  // namespace
+
+void principal_axes(std::array<std::array<double, 3>, 3>& matrix, std::array<std::array<double, 3>, 3>& axes, int dimension) {
+  // Jacobi rotations.
   axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   const auto n = static_cast<std::size_t>(dimension);
   for (int sweep = 0; sweep < 4; ++sweep) {
@@ -73,8 +75,6 @@ void diagonalise(std::array<std::array<double, 3>, 3>& matrix, std::array<std::a
     }
   }
 }
-
-}  // namespace
 
 std::span<const std::uint32_t> MortonOrder::sort(std::span<const float* const> columns, std::size_t count) {
   const std::size_t dimensions = columns.size();
@@ -233,7 +233,7 @@ BlockBounds bound_block(const float* const* columns, const float* caps, int dime
       covariance[a][b] = covariance[b][a] = static_cast<double>(sum) / static_cast<double>(bounds.count);
     }
   }
-  diagonalise(covariance, axes, dimension);
+  principal_axes(covariance, axes, dimension);
   // What the sums above and the axes' own rounding may have added to the variance in any direction; it may well make one negative.
   const double trace = covariance[0][0] + covariance[1][1] + covariance[2][2];
   const double rounding = 4.0 * static_cast<double>(kSumRounding) * trace;

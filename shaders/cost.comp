@@ -1,5 +1,7 @@
 // First pass of a swarm's costs: each group sums the loss of kTile particles over one chunk of points,
 // kSpecGroup x kWork quads. Coefficients and sums stay in registers; every sum is taken in a fixed order.
+// Pruned, a group looks at kSpan particles: of those whose every point here is beyond its cap the sums are those of the caps, of those
+// that cannot come below their cutoff nobody asks, and the others are taken kTile at a time.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common.glsl"
@@ -7,6 +9,15 @@
 layout(constant_id = kSpecLoss) const uint kLoss = 0;
 layout(constant_id = kSpecTile) const uint kTile = 8;
 layout(constant_id = kSpecWork) const uint kWork = 8;
+#ifdef SWARMFIT_PRUNED
+#include "bounds.glsl"
+layout(constant_id = kSpecSpan) const uint kSpan = 64;
+shared uint is_open[kSpan / 32];
+shared uint open[kSpan];
+#define PARTICLE(at) open[min(at, end - 1)]
+#else
+#define PARTICLE(at) (at)
+#endif
 
 layout(set = 0, binding = kBindPartials, std430) writeonly buffer Partials { float partials[]; };
 
@@ -28,17 +39,15 @@ vec4 loss(vec4 residuals, vec4 cap) {
 }
 #endif
 
-void main() {
+// Sums of the particles from `first` on over the group's chunk, a tile of them or as many as there are before `end`.
+void add_up(uint chunk, uint first, uint end) {
   const uint group = gl_WorkGroupSize.x;
   const uint lane = gl_LocalInvocationID.x;
-  const uint chunk = gl_WorkGroupID.x;
-  const uint first = gl_WorkGroupID.y * kTile;
-
   float k[kTile * kCoefficientStride];
   float sum[kTile];
   [[unroll]] for (uint t = 0; t < kTile; ++t) {
     float one[kCoefficientStride];
-    load_model(first + t, one);
+    load_model(PARTICLE(first + t), one);
     [[unroll]] for (uint i = 0; i < kCoefficientStride; ++i) k[t * kCoefficientStride + i] = one[i];
     sum[t] = 0.0;
   }
@@ -58,7 +67,9 @@ void main() {
 
 #ifdef SWARMFIT_TEXELS
   // Where an exchange between invocations is dearer than a few more partial sums, each leaves its own.
-  [[unroll]] for (uint t = 0; t < kTile; ++t) partials[(first + t) * push.partials + chunk * group + lane] = sum[t];
+  [[unroll]] for (uint t = 0; t < kTile; ++t) {
+    if (first + t < end) partials[PARTICLE(first + t) * push.partials + chunk * group + lane] = sum[t];
+  }
 #else
   [[unroll]] for (uint t = 0; t < kTile; ++t) sums[t * group + lane] = sum[t];
   barrier();
@@ -69,6 +80,59 @@ void main() {
     }
     barrier();
   }
-  for (uint t = lane; t < kTile; t += group) partials[(first + t) * push.partials + chunk] = sums[t * group];
+  for (uint t = lane; t < kTile && first + t < end; t += group) partials[PARTICLE(first + t) * push.partials + chunk] = sums[t * group];
 #endif
 }
+
+#ifdef SWARMFIT_PRUNED
+// The partial sums that the chunk's caps leave, as add_up would.
+void add_caps(uint chunk, uint particle) {
+  const uint own = push.partials / gl_NumWorkGroups.x;  // partial sums of a chunk
+  const uint first = kBoundColumns * push.bound_stride + (kLoss == kLossL2 ? push.partials : 0) + chunk * own;
+  for (uint i = first; i < first + own; ++i) partials[particle * push.partials + chunk * own + (i - first)] = bounds[i / 4][i % 4];
+}
+
+void main() {
+  const uint group = gl_WorkGroupSize.x;
+  const uint lane = gl_LocalInvocationID.x;
+  const uint chunk = gl_WorkGroupID.x;
+  if (lane < kSpan / 32) is_open[lane] = 0;
+  barrier();
+  for (uint i = lane; i < kSpan; i += group) {
+    const uint particle = gl_WorkGroupID.y * kSpan + i;
+    if (particle >= push.models) break;
+    float k[kCoefficientStride];
+    load_model(particle, k);
+    if (lower[particle] >= k[kCutoffSlot]) continue;
+    const float most = four_bounds(kBoundMostCap, chunk / kQuad)[chunk % kQuad];
+    if (most == 0.0 || nearest_of(chunk / kQuad, k)[chunk % kQuad] > most) {
+      add_caps(chunk, particle);
+    } else {
+      atomicOr(is_open[i / 32], 1u << (i % 32));
+    }
+  }
+  barrier();
+  uint count = 0;
+  for (uint w = 0; w < kSpan / 32; ++w) {
+    // In their order, whoever came first.
+    for (uint bit = lane; bit < 32; bit += group) {
+      if ((is_open[w] >> bit & 1u) == 0) continue;
+      open[count + bitCount(is_open[w] & ((1u << bit) - 1u))] = gl_WorkGroupID.y * kSpan + w * 32 + bit;
+    }
+    count += bitCount(is_open[w]);
+  }
+  barrier();
+  if (lane == 0) atomicAdd(looked_into, count);
+  for (uint first = 0; first < count; first += kTile) {
+    add_up(chunk, first, count);
+#ifndef SWARMFIT_TEXELS
+    barrier();
+#endif
+  }
+}
+#else
+void main() {
+  const uint first = gl_WorkGroupID.y * kTile;
+  add_up(gl_WorkGroupID.x, first, first + kTile);
+}
+#endif

@@ -17,13 +17,15 @@ SWARMFIT_CONST kBindCaps = 1;          // one a point; assign.comp reads toleran
 SWARMFIT_CONST kBindCoefficients = 2;  // kCoefficientStride floats a model
 SWARMFIT_CONST kBindPartials = 3;      // [model][partial sum]; distances and labels are written here
 SWARMFIT_CONST kBindCosts = 4;         // [model]
-SWARMFIT_CONST kStorageBindings = 5;
+SWARMFIT_CONST kBindBounds = 5;        // of chunks: columns of push.bound_stride floats, then partial sums of the caps, L1 and L2
+SWARMFIT_CONST kBindLower = 6;         // pairs of a chunk and a model that were looked into; then a lower bound of each model's cost
+SWARMFIT_CONST kStorageBindings = 7;
 // The first four once more, as texel buffers, four floats a texel: see fetch.glsl.
-SWARMFIT_CONST kBindPointTexels = 5;
-SWARMFIT_CONST kBindCapTexels = 6;
-SWARMFIT_CONST kBindCoefficientTexels = 7;
-SWARMFIT_CONST kBindPartialTexels = 8;
-SWARMFIT_CONST kBindingCount = 9;
+SWARMFIT_CONST kBindPointTexels = 7;
+SWARMFIT_CONST kBindCapTexels = 8;
+SWARMFIT_CONST kBindCoefficientTexels = 9;
+SWARMFIT_CONST kBindPartialTexels = 10;
+SWARMFIT_CONST kBindingCount = 11;
 
 // Specialisation constants.
 SWARMFIT_CONST kSpecGroup = 0;      // invocations in a group: the subgroup's size or a multiple of it
@@ -32,7 +34,8 @@ SWARMFIT_CONST kSpecLoss = 2;       // a Loss
 SWARMFIT_CONST kSpecDimension = 3;  // columns of a point
 SWARMFIT_CONST kSpecTile = 4;       // particles held by an invocation
 SWARMFIT_CONST kSpecWork = 5;       // quads (four points) an invocation goes through
-SWARMFIT_CONST kSpecCount = 6;
+SWARMFIT_CONST kSpecSpan = 6;       // pruned: models that a group of invocations looks at; a multiple of 32
+SWARMFIT_CONST kSpecCount = 7;
 
 SWARMFIT_CONST kAnyModel = 0xFFFFFFFFu;
 SWARMFIT_CONST kLossL1 = 0;
@@ -40,15 +43,26 @@ SWARMFIT_CONST kLossL2 = 1;
 
 SWARMFIT_CONST kMaxColumns = 4;
 SWARMFIT_CONST kCoefficientStride = 20;  // floats from one model to the next: kMaxCoefficients coefficients, then
+SWARMFIT_CONST kSlackSlot = 15;          // pruned: what rounding may do to a distance
+SWARMFIT_CONST kSteepSlot = 16;          // pruned: how much a distance changes, at most, from one point to another as far apart as 1
+SWARMFIT_CONST kCutoffSlot = 17;         // pruned: what its cost is compared with
 SWARMFIT_CONST kKindSlot = 18;           // assign: its ModelKind
 SWARMFIT_CONST kNumberSlot = 19;         // assign: its label
 SWARMFIT_CONST kQuad = 4;
 
+// Columns of a chunk's bounds: the mean of its points, one a column of theirs, and then
+SWARMFIT_CONST kBoundRadius = 4;   // of a ball about the mean that holds them
+SWARMFIT_CONST kBoundMostCap = 5;  // of its caps
+SWARMFIT_CONST kBoundCapSum = 6;   // sum of its caps; then of their squares
+SWARMFIT_CONST kBoundAxes = 8;     // of a box about the mean: half an edge after the other, as many columns each as a point has
+SWARMFIT_CONST kBoundColumns = 17;
+
 struct Push {
   uint column_stride;  // points in a column, padding included; a multiple of kQuad
   uint partials;       // partial sums of a particle: one a chunk of points, or one an invocation of a chunk
-  uint models;         // assign: how many
+  uint models;         // assign, pruned: how many
   float tolerance;     // assign: for all points; negative where each has its own
+  uint bound_stride;   // chunks, padded to a multiple of kQuad
 };
 
 #ifdef __cplusplus

@@ -18,6 +18,10 @@ const uint kWidth = 1;
 float total(float one) { return one; }
 #endif
 layout(set = 0, binding = kBindCosts, std430) writeonly buffer Costs { float costs[]; };
+#ifdef SWARMFIT_PRUNED
+layout(set = 0, binding = kBindCoefficients, std430) readonly buffer Coefficients { float coefficients[]; };
+layout(set = 0, binding = kBindLower, std430) readonly buffer Lower { float lower[]; };  // after four words, see bounds.glsl
+#endif
 layout(push_constant) uniform PushBlock { Push push; };
 
 shared float sums[gl_WorkGroupSize.x];
@@ -27,6 +31,12 @@ void main() {
   const uint lane = gl_LocalInvocationID.x;
   const uint particle = gl_WorkGroupID.x;
 
+#ifdef SWARMFIT_PRUNED
+  if (lower[4 + particle] >= coefficients[particle * kCoefficientStride + kCutoffSlot]) {
+    if (lane == 0) costs[particle] = lower[4 + particle];
+    return;
+  }
+#endif
   const uint row = push.partials / kWidth;
   precise Sum sum = Sum(0.0);
   precise Sum lost = Sum(0.0);  // what the additions rounded away

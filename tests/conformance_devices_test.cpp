@@ -50,6 +50,59 @@ TEST_P(CpuDevices, ThreadsChangeNothing) {
   }
 }
 
+/// Half of a swarm about one model, half anywhere: some chunks are beyond all of it, others are not.
+TEST_P(VulkanDevices, PruningChangesNoCost) {
+  EvaluatorOptions options = GetParam().options;
+  const auto pruned = make(options);
+  options.pruning = false;
+  const auto all = make(options);
+  options.pruning = true;
+  options.max_storage_range = 200000;
+  const auto split = make(options);
+  ASSERT_TRUE(pruned && all && split);
+  for (const ModelKind kind : kModelKinds) {
+    SCOPED_TRACE(traits(kind).name);
+    Cloud cloud = make_cloud(kind, 30001);
+    cloud.narrow[9] = std::numeric_limits<float>::quiet_NaN();
+    std::fill(cloud.caps.begin() + 2000, cloud.caps.begin() + 9000, 0.0F);
+    const std::vector<double> swarm = make_swarm(kind, 150);
+    // In one order for all: what is not pruned need not be sorted.
+    PointsView view = cloud.view();
+    view.ordered = kind == ModelKind::plane || kind == ModelKind::line2d;
+    for (FitnessEvaluator* one : {pruned.get(), all.get(), split.get()}) {
+      ASSERT_OK(one->set_points(view));
+      ASSERT_OK(one->set_caps(cloud.caps));
+    }
+    for (const Loss loss : {Loss::truncated_l1, Loss::truncated_l2}) {
+      std::vector<float> exact(150), same(150), known(150), parts(150);
+      ASSERT_OK(all->evaluate({kind, 150, swarm}, loss, {}, exact));
+      ASSERT_OK(pruned->evaluate({kind, 150, swarm}, loss, {}, same));
+      std::vector<float> cutoffs = exact;
+      for (std::size_t j = 0; j < 150; ++j) cutoffs[j] *= j % 3 == 0 ? 0.3F : j % 3 == 1 ? 1.001F : 1.0F;
+      ASSERT_OK(pruned->evaluate({kind, 150, swarm}, loss, cutoffs, known));
+      ASSERT_OK(split->evaluate({kind, 150, swarm}, loss, cutoffs, parts));
+      const auto worst = static_cast<float>(kCostTolerance * cloud.worst_loss(loss));
+      for (std::size_t j = 0; j < 150; ++j) {
+        EXPECT_NEAR(same[j], exact[j], view.ordered ? 0 : worst) << j;
+        for (const float told : {known[j], parts[j]}) {
+          EXPECT_LE(told, exact[j] + worst) << j;
+          if (exact[j] + worst < cutoffs[j]) {
+            EXPECT_NEAR(told, exact[j], worst) << j;
+          } else {
+            EXPECT_GE(told, cutoffs[j] - worst) << j;
+          }
+        }
+      }
+    }
+    const Effort effort = pruned->effort();
+    EXPECT_EQ(effort.evaluations, 600U);
+    EXPECT_LE(effort.touched, effort.point_models);
+    if (traits(kind).bounded && !traits(kind).affine) {
+      EXPECT_LT(effort.touched, effort.point_models);
+    }
+  }
+}
+
 TEST_P(VulkanDevices, SmallStorageRangesSplitTheCloud) {
   EvaluatorOptions options = GetParam().options;
   for (const std::size_t range : {16384, 50000, 1000000}) {

@@ -15,9 +15,6 @@ constexpr std::size_t kMaxRuns = 128;
 constexpr std::size_t kManyRuns = 32;
 /// Points x models below which looking at the blocks first cannot pay for the extra passes.
 constexpr std::size_t kLeastWork = std::size_t{1} << 18;
-/// Share of the residuals computed above which pruning pauses, for twice as long each time up to the longest pause.
-constexpr double kPoorShare = 0.8;
-constexpr int kLongestPause = 32;
 /// What a swarm is shared out in where it is pruned: groups enough to keep each thread busy, of models enough for register tiles.
 constexpr std::size_t kGroupsPerThread = 3, kLeastGroup = 8;
 
@@ -69,25 +66,17 @@ float below(double value) { return std::nextafter(static_cast<float>(value), 0.0
 
 }  // namespace
 
-void SwarmCosts::forget() noexcept { pause_ = last_pause_ = 0; }
-
 std::uint64_t SwarmCosts::evaluate(PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs) {
   const Summing summing = points.summing(loss);
   if (!prune_now(points, swarm, summing)) return evaluate_all(points, swarm, summing, costs);
   const std::uint64_t touched = evaluate_open(points, swarm, summing, costs);
-  const double share = static_cast<double>(touched) / (static_cast<double>(points.finite()) * static_cast<double>(swarm.count));
-  last_pause_ = share > kPoorShare ? std::clamp(2 * last_pause_, 1, kLongestPause) : 0;
-  pause_ = last_pause_;
+  pause_.note(static_cast<double>(touched) / (static_cast<double>(points.finite()) * static_cast<double>(swarm.count)));
   return touched;
 }
 
 bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing) {
   if (!pruning_ || !traits(swarm.kind).bounded || summing.scale == 0 || points.finite() * swarm.count < kLeastWork) return false;
-  if (pause_ > 0) {
-    --pause_;
-    return false;
-  }
-  return true;
+  return pause_.now();
 }
 
 std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,

@@ -8,6 +8,7 @@
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/cpu/point_store.hpp"
 #include "kernels/cpu/tasks.hpp"
+#include "kernels/pruning_pause.hpp"
 
 namespace swarmfit::kernels::cpu {
 
@@ -50,7 +51,7 @@ class SwarmCosts {
   SwarmCosts(const CpuKernels& kernels, bool pruning) : kernels_(kernels), pruning_(pruning) {}
 
   /// New points or caps: what was learnt about how pruning pays is void.
-  void forget() noexcept;
+  void forget() noexcept { pause_.forget(); }
   /// Fills costs; returns how many residuals were computed.
   std::uint64_t evaluate(PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs);
 
@@ -61,8 +62,7 @@ class SwarmCosts {
 
   const CpuKernels& kernels_;
   bool pruning_;
-  int pause_ = 0;  ///< evaluations to go before pruning is tried again
-  int last_pause_ = 0;
+  PruningPause pause_{0.8};
 
   /// Of one thread or one run of tiles; begun anew with each swarm. What another core wrote is slow to get at,
   /// so there are few, and each is written by one thread alone.

@@ -48,6 +48,15 @@ void centred_coefficients(ModelKind kind, std::size_t count, const double* param
   });
 }
 
+float residual_steepness(ModelKind kind, const float* coefficients) noexcept {
+  constexpr float kRoom = 1.0F + 1e-5F;
+  const ModelTraits& model = traits(kind);
+  if (!model.affine) return kRoom;  // a distance in space
+  double square = 0;
+  for (int d = 0; d < model.dimension; ++d) square += static_cast<double>(coefficients[d]) * static_cast<double>(coefficients[d]);
+  return kRoom * static_cast<float>(std::sqrt(square));
+}
+
 float residual_rounding(ModelKind kind, const float* coefficients, const float* reach) noexcept {
   constexpr float kRounding = 2e-6F, kMost = 1e30F;
   return visit_model(kind, [&]<class M>() {

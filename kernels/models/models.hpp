@@ -63,6 +63,9 @@ bool centred_coefficients(ModelKind kind, const double* parameters, const double
 void centred_coefficients(ModelKind kind, std::size_t count, const double* parameters, const double* centre, float* coefficients,
                           char* finite) noexcept;
 
+/// How much a distance changes at most from one point to another, as a share of how far apart they are. Bounded kinds only.
+float residual_steepness(ModelKind kind, const float* coefficients) noexcept;
+
 /// What rounding may do to a residual in float, its own or a block's, at points whose coordinates are at most `reach`. Bounded kinds only.
 float residual_rounding(ModelKind kind, const float* coefficients, const float* reach) noexcept;
 

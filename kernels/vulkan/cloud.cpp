@@ -1,6 +1,7 @@
 #include "kernels/vulkan/cloud.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -37,6 +38,9 @@ Result<> Cloud::set(const PointsView& points, Extent extent) {
       if (extent_.finite[i]) rows_.push_back(static_cast<std::uint32_t>(i));
     }
   }
+  bounded_ = sorted_ && points.dimension <= 3 && extent_.finite_count > shape_.points();
+  read_columns(points);
+  if (bounded_ && !points.ordered) sort();
   segments_.resize((extent_.finite_count + limit - 1) / limit);
   for (std::size_t s = 0; s < segments_.size(); ++s) {
     Segment& segment = segments_[s];
@@ -47,27 +51,74 @@ Result<> Cloud::set(const PointsView& points, Extent extent) {
     segment.sums = segment.chunks * shape_.sums;
     segment.points.reserve(device_, sizeof(float) * static_cast<std::size_t>(points.dimension) * segment.stride, Residence::device);
     segment.caps.reserve(device_, sizeof(float) * segment.stride, Residence::device);
-    write_columns(segment, points);
+    write_columns(segment);
     write(segment.caps, segment.stride, [](std::span<float> out) { std::fill(out.begin(), out.end(), 0.0F); });
   }
   return {};
 }
 
-void Cloud::write_columns(Segment& segment, const PointsView& points) {
-  const auto columns = static_cast<std::size_t>(points.dimension);
-  write(segment.points, columns * segment.stride, [&](std::span<float> out) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::span<float> column = out.subspan(c * segment.stride, segment.stride);
-      for (std::size_t i = 0; i < segment.count; ++i) {
-        column[i] = centred(points.at(row(segment.first + i), static_cast<int>(c)), extent_.centre[c]);
-      }
-      std::fill(column.begin() + segment.count, column.end(), 0.0F);
+void Cloud::read_columns(const PointsView& points) {
+  dimension_ = points.dimension;
+  reach_ = {};
+  for (std::size_t c = 0; c < static_cast<std::size_t>(dimension_); ++c) {
+    columns_[c].resize(extent_.finite_count);
+    for (std::size_t i = 0; i < extent_.finite_count; ++i) {
+      const float x = columns_[c][i] = centred(points.at(row(i), static_cast<int>(c)), extent_.centre[c]);
+      reach_[c] = std::max(reach_[c], std::abs(x));
+    }
+  }
+}
+
+void Cloud::sort() {
+  const auto width = static_cast<std::size_t>(dimension_);
+  std::array<const float*, kMaxDimension> columns{};
+  for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
+  const std::span<const std::uint32_t> order = order_.sort(std::span(columns).first(width), extent_.finite_count);
+  for (std::size_t c = 0; c < width; ++c) {
+    scratch_.resize(order.size());
+    std::transform(order.begin(), order.end(), scratch_.begin(), [&](std::uint32_t i) { return columns_[c][i]; });
+    columns_[c].swap(scratch_);
+  }
+  std::vector<std::uint32_t> rows(order.size());
+  std::transform(order.begin(), order.end(), rows.begin(), [&](std::uint32_t i) { return static_cast<std::uint32_t>(row(i)); });
+  rows_ = std::move(rows);
+}
+
+void Cloud::write_columns(Segment& segment) {
+  const auto width = static_cast<std::size_t>(dimension_);
+  write(segment.points, width * segment.stride, [&](std::span<float> out) {
+    for (std::size_t c = 0; c < width; ++c) {
+      const auto column = out.subspan(c * segment.stride, segment.stride);
+      const auto first = columns_[c].begin() + static_cast<std::ptrdiff_t>(segment.first);
+      std::fill(std::copy(first, first + segment.count, column.begin()), column.end(), 0.0F);
     }
   });
+  if (!bounded_) return;
+  ChunkBounds::Columns columns;
+  for (std::size_t c = 0; c < width; ++c) columns[c] = std::span(columns_[c]).subspan(segment.first, segment.count);
+  segment.known.set_points(shape_, columns, dimension_);
+  segment.bounds.reserve(device_, segment.known.values().size_bytes(), Residence::device);
+  write_bounds(segment);
+}
+
+void Cloud::write_bounds(Segment& segment) {
+  const std::span<const float> values = segment.known.values();
+  write(segment.bounds, values.size(), [&](std::span<float> out) { std::copy(values.begin(), values.end(), out.begin()); });
 }
 
 void Cloud::write_caps(std::span<const float> values) {
-  for (Segment& segment : segments_) write_values(segment, segment.caps, values);
+  for (Segment& segment : segments_) {
+    write_values(segment, segment.caps, values);
+    if (!bounded_) continue;
+    segment.known.set_caps(gather(segment, values));
+    write_bounds(segment);
+  }
+}
+
+std::span<const float> Cloud::gather(const Segment& segment, std::span<const float> values) {
+  scratch_.resize(segment.count);
+  for (std::size_t i = 0; i < segment.count; ++i) scratch_[i] = values[row(segment.first + i)];
+  return scratch_;
 }
 
 void Cloud::write_tolerance(std::span<const float> values) {

@@ -1,10 +1,13 @@
 // The points on the device: finite ones only, centred, column after column, in segments no larger than a binding may be.
 #pragma once
 
+#include <array>
 #include <vector>
 
+#include "kernels/blocks.hpp"
 #include "kernels/checks.hpp"
 #include "kernels/vulkan/buffer.hpp"
+#include "kernels/vulkan/chunk_bounds.hpp"
 #include "kernels/vulkan/tile_shape.hpp"
 
 namespace swarmfit::kernels::vulkan {
@@ -17,14 +20,17 @@ struct Segment {
   std::uint32_t sums = 0;  ///< partial sums of a particle
   Buffer points;
   Buffer caps;
-  Buffer partials;   ///< [particle][partial sum]
+  Buffer partials;  ///< [particle][partial sum]
+  ChunkBounds known;
+  Buffer bounds;     ///< what is known, on the device
   Buffer tolerance;  ///< like caps; made when assign first needs it
   Buffer output;     ///< distances or labels; made when first needed
 };
 
 class Cloud {
  public:
-  explicit Cloud(const Device& device) : device_(device) {}
+  /// `sorted`: points of two or three columns are put in Morton order, so that chunks are small in space, and chunks are bounded.
+  Cloud(const Device& device, bool sorted) : device_(device), sorted_(sorted) {}
 
   /// Copies the points, and sets all caps to 0. Buffers that are large enough are kept. Throws std::exception.
   /// Fails with `invalid` where a single chunk does not fit the device's storage range.
@@ -34,6 +40,10 @@ class Cloud {
   void write_tolerance(std::span<const float> values);
 
   const Extent& extent() const noexcept { return extent_; }
+  /// Are there bounds of chunks?
+  bool bounded() const noexcept { return bounded_; }
+  /// Largest |coordinate| about the centre, a column.
+  const std::array<float, kMaxDimension>& reach() const noexcept { return reach_; }
   const ChunkShape& shape() const noexcept { return shape_; }
   std::vector<Segment>& segments() noexcept { return segments_; }
   /// The row in the input of a finite point.
@@ -43,12 +53,23 @@ class Cloud {
   template <class Fill>
   void write(Buffer& buffer, std::size_t floats, Fill&& fill);
   void write_values(Segment& segment, Buffer& buffer, std::span<const float> values);
-  void write_columns(Segment& segment, const PointsView& points);
+  void write_columns(Segment& segment);
+  void write_bounds(Segment& segment);
+  void read_columns(const PointsView& points);
+  void sort();
+  /// `values` in the segment's order, without padding.
+  std::span<const float> gather(const Segment& segment, std::span<const float> values);
 
   const Device& device_;
+  bool sorted_, bounded_ = false;
+  std::array<float, kMaxDimension> reach_{};
+  int dimension_ = 0;
+  std::array<std::vector<float>, kMaxDimension> columns_;  // centred, of the finite points in the order they are stored in
+  std::vector<float> scratch_;
+  MortonOrder order_;
   Extent extent_;
   ChunkShape shape_;
-  std::vector<std::uint32_t> rows_;  // empty where all points are finite
+  std::vector<std::uint32_t> rows_;  // empty where it would be the identity
   std::vector<Segment> segments_;
   Buffer staging_;
 };

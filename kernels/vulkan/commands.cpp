@@ -18,10 +18,11 @@ using Access = vk::AccessFlagBits;
 constexpr std::size_t kPartialsLimit = std::size_t{256} << 20;  // bytes for all partial sums
 constexpr std::size_t kRowFloats = 64;  // rows of costs start 256 bytes apart, the largest alignment Vulkan may ask for
 constexpr std::size_t kMostRecorded = 64;
+constexpr std::size_t kLowerHead = 4;  // words before the lower bounds
 
 std::uint32_t reduce_group(const DeviceTraits& device) { return device.software ? device.subgroup : std::min(64U, device.group_limit); }
 
-void wait_for(const vk::raii::CommandBuffer& commands, Access access, Stage stage) {
+void wait_for(const vk::raii::CommandBuffer& commands, vk::AccessFlags access, Stage stage) {
   const vk::MemoryBarrier written(Access::eShaderWrite, access);
   commands.pipelineBarrier(Stage::eComputeShader, stage, {}, written, {}, {});
 }
@@ -77,6 +78,8 @@ void Commands::reserve_particles(std::uint32_t particles) {
   for (Segment& segment : cloud_->segments()) {
     segment.partials.reserve(device_, sizeof(float) * particles * segment.sums, Residence::device);
   }
+  lower_.resize(cloud_->segments().size());
+  for (Buffer& lower : lower_) lower.reserve(device_, sizeof(float) * (kLowerHead + particles), Residence::readback);
   room_ = particles;
   bind_costs();
 }
@@ -86,8 +89,12 @@ void Commands::bind_costs() {
     const Segment& segment = cloud_->segments()[s];
     bind_set(*cost_sets_[s], segment, segment.caps, segment.partials);
     const vk::DescriptorBufferInfo costs(costs_.handle(), sizeof(float) * cost_offset(s), sizeof(float) * cost_stride_);
-    const vk::WriteDescriptorSet write(*cost_sets_[s], layout::kBindCosts, 0, vk::DescriptorType::eStorageBuffer, {}, costs);
-    device_.handle().updateDescriptorSets(write, {});
+    // A cloud without bounds has something in their place, which no shader looks at.
+    const Buffer& bounds = cloud_->bounded() ? segment.bounds : lower_[s];
+    const std::array<vk::DescriptorBufferInfo, 3> buffers{
+        {costs, {bounds.handle(), 0, VK_WHOLE_SIZE}, {lower_[s].handle(), 0, VK_WHOLE_SIZE}}};
+    device_.handle().updateDescriptorSets(
+        vk::WriteDescriptorSet(*cost_sets_[s], layout::kBindCosts, 0, vk::DescriptorType::eStorageBuffer, {}, buffers), {});
   }
 }
 
@@ -124,7 +131,7 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
   const auto each_segment = [&](std::uint32_t x, std::uint32_t y) {
     for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
       const Segment& segment = cloud_->segments()[s];
-      const layout::Push push{segment.stride, segment.sums, 0, 0};
+      const layout::Push push{segment.stride, segment.sums, 0, 0, 0};
       commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
       commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
       commands.dispatch(x > 0 ? x : segment.chunks, y, 1);
@@ -140,23 +147,79 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
   return commands;
 }
 
-void Commands::costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs) {
-  const TileShape shape = tile_shape(device_.traits(), costs.size(), coefficients);
-  reserve_particles(shape.padded());
-  const Key key{kind, loss, shape.tile, shape.tiles};
+vk::raii::CommandBuffer Commands::record_pruned(ModelKind kind, Loss loss, const TileShape& shape, std::size_t models) const {
+  const vk::PipelineLayout layout = pipelines_.layout();
+  const ChunkShape& chunk = cloud_->shape();
+  Specialisation wanted{.shader = Shader::bound,
+                        .group = reduce_group(device_.traits()),
+                        .model = static_cast<std::uint32_t>(kind),
+                        .loss = static_cast<std::uint32_t>(loss),
+                        .dimension = static_cast<std::uint32_t>(dimension_)};
+  const vk::Pipeline bound = pipelines_.get(wanted);
+  const vk::Pipeline reduce = pipelines_.get({.shader = Shader::reduce_pruned, .group = reduce_group(device_.traits())});
+  wanted.shader = Shader::cost_pruned;
+  wanted.group = chunk.group;
+  wanted.tile = shape.tile;
+  wanted.work = chunk.work;
+  wanted.span = kSpan;
+  const vk::Pipeline cost = pipelines_.get(wanted);
+
+  vk::raii::CommandBuffer commands = device_.allocate_commands();
+  commands.begin(vk::CommandBufferBeginInfo());
+  const auto count = static_cast<std::uint32_t>(models);
+  const auto each_segment = [&](vk::Pipeline pipeline, auto&& groups) {
+    commands.bindPipeline(vk::PipelineBindPoint::eCompute, pipeline);
+    for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
+      const Segment& segment = cloud_->segments()[s];
+      const layout::Push push{segment.stride, segment.sums, count, 0, segment.known.stride()};
+      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
+      commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
+      const auto [x, y] = groups(segment);
+      commands.dispatch(x, y, 1);
+    }
+  };
+  using Grid = std::pair<std::uint32_t, std::uint32_t>;
+  each_segment(bound, [&](const Segment&) { return Grid(count, 1); });
+  wait_for(commands, Access::eShaderRead | Access::eShaderWrite, Stage::eComputeShader);
+  each_segment(cost, [&](const Segment& segment) { return Grid(segment.chunks, (count + kSpan - 1) / kSpan); });
+  wait_for(commands, Access::eShaderRead, Stage::eComputeShader);
+  each_segment(reduce, [&](const Segment&) { return Grid(count, 1); });
+  wait_for(commands, Access::eHostRead, Stage::eHost);
+  commands.end();
+  return commands;
+}
+
+template <class Record>
+void Commands::run_costs(const Key& key, std::span<float> costs, Record&& record) {
   auto commands = recorded_.find(key);
   if (commands == recorded_.end()) {
     if (recorded_.size() >= kMostRecorded) recorded_.clear();
-    commands = recorded_.emplace(key, record_costs(kind, loss, shape)).first;
+    commands = recorded_.emplace(key, record()).first;
   }
   device_.run(*commands->second);
-
   const std::span<const float> rows = costs_.as<const float>();
   for (std::size_t j = 0; j < costs.size(); ++j) {
     double sum = 0;
     for (std::size_t s = 0; s < cost_sets_.size(); ++s) sum += static_cast<double>(rows[cost_offset(s) + j]);
     costs[j] = static_cast<float>(sum);
   }
+}
+
+void Commands::costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs) {
+  const TileShape shape = tile_shape(device_.traits(), costs.size(), coefficients);
+  reserve_particles(shape.padded());
+  run_costs({kind, loss, shape.tile, shape.tiles, 0}, costs, [&] { return record_costs(kind, loss, shape); });
+}
+
+std::uint64_t Commands::pruned_costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs) {
+  // Full tiles, but for a small swarm: how many particles are open is known on the device alone.
+  const TileShape shape = tile_shape(device_.traits(), std::min<std::size_t>(costs.size(), kSpan), coefficients);
+  reserve_particles(static_cast<std::uint32_t>(costs.size()));
+  for (Buffer& lower : lower_) lower.as<std::uint32_t>()[0] = 0;
+  run_costs({kind, loss, shape.tile, 0, costs.size()}, costs, [&] { return record_pruned(kind, loss, shape, costs.size()); });
+  std::uint64_t pairs = 0;
+  for (const Buffer& lower : lower_) pairs += lower.as<const std::uint32_t>()[0];
+  return pairs * cloud_->shape().points();
 }
 
 void Commands::distances(ModelKind kind) {
@@ -180,7 +243,7 @@ void Commands::run_map(const Specialisation& wanted, std::size_t models, float t
   once_.bindPipeline(vk::PipelineBindPoint::eCompute, pipelines_.get(wanted));
   for (std::size_t s = 0; s < map_sets_.size(); ++s) {
     const Segment& segment = cloud_->segments()[s];
-    const layout::Push push{segment.stride, segment.sums, static_cast<std::uint32_t>(models), tolerance};
+    const layout::Push push{segment.stride, segment.sums, static_cast<std::uint32_t>(models), tolerance, 0};
     once_.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *map_sets_[s], {});
     once_.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
     once_.dispatch((segment.stride / layout::kQuad + wanted.group - 1) / wanted.group, 1, 1);

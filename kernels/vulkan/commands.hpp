@@ -28,6 +28,9 @@ class Commands {
 
   /// Runs both passes over the coefficients written, so many a model; sums segments in double.
   void costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs);
+  /// The same of a bounded cloud, pruned: rows hold what the slots of shaders/layout.h ask for as well. Returns how many residuals were
+  /// computed.
+  std::uint64_t pruned_costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs);
   /// Fills each segment's output, mapped, with floats.
   void distances(ModelKind kind);
   /// Fills each segment's output with 32-bit labels. `kind` is that of all models, or layout::kAnyModel. A negative tolerance: each point
@@ -37,7 +40,7 @@ class Commands {
   static constexpr std::size_t kModelBytes = sizeof(float) * layout::kCoefficientStride;
 
  private:
-  using Key = std::tuple<ModelKind, Loss, std::uint32_t, std::uint32_t>;
+  using Key = std::tuple<ModelKind, Loss, std::uint32_t, std::uint32_t, std::size_t>;  // kind, loss, tile, tiles, models pruned
 
   void make_sets();
   void reserve_particles(std::uint32_t particles);
@@ -45,6 +48,10 @@ class Commands {
   void bind_map(bool own_tolerance);
   void bind_set(vk::DescriptorSet set, const Segment& segment, const Buffer& caps, const Buffer& out) const;
   vk::raii::CommandBuffer record_costs(ModelKind kind, Loss loss, const TileShape& shape) const;
+  vk::raii::CommandBuffer record_pruned(ModelKind kind, Loss loss, const TileShape& shape, std::size_t models) const;
+  /// Runs what is recorded under this, or what `record` records, and adds up the segments' costs.
+  template <class Record>
+  void run_costs(const Key& key, std::span<float> costs, Record&& record);
   void run_map(const Specialisation& wanted, std::size_t models, float tolerance);
   std::size_t cost_offset(std::size_t segment) const { return segment * cost_stride_; }
 
@@ -53,7 +60,8 @@ class Commands {
   Cloud* cloud_ = nullptr;
   int dimension_ = 0;
   Buffer coefficients_;
-  Buffer costs_;  // [segment][particle], rows cost_stride_ floats apart
+  std::vector<Buffer> lower_;  // a segment; see shaders/bounds.glsl
+  Buffer costs_;               // [segment][particle], rows cost_stride_ floats apart
   std::size_t cost_stride_ = 0;
   std::size_t room_ = 0;  // particles that partials and costs have room for
   vk::raii::DescriptorPool pool_{nullptr};

@@ -12,11 +12,17 @@ namespace {
 
 #include "embedded/assign.h"
 #include "embedded/assign_texels.h"
+#include "embedded/bound.h"
+#include "embedded/bound_texels.h"
 #include "embedded/cost.h"
+#include "embedded/cost_pruned.h"
+#include "embedded/cost_pruned_texels.h"
 #include "embedded/cost_texels.h"
 #include "embedded/distances.h"
 #include "embedded/distances_texels.h"
 #include "embedded/reduce.h"
+#include "embedded/reduce_pruned.h"
+#include "embedded/reduce_pruned_texels.h"
 #include "embedded/reduce_texels.h"
 #include "embedded/shader_models.h"
 
@@ -27,6 +33,9 @@ Spirv spirv(Shader shader, bool texels) {
     case Shader::cost: return texels ? Spirv(cost_texels_spirv) : Spirv(cost_spirv);
     case Shader::reduce: return texels ? Spirv(reduce_texels_spirv) : Spirv(reduce_spirv);
     case Shader::distances: return texels ? Spirv(distances_texels_spirv) : Spirv(distances_spirv);
+    case Shader::bound: return texels ? Spirv(bound_texels_spirv) : Spirv(bound_spirv);
+    case Shader::cost_pruned: return texels ? Spirv(cost_pruned_texels_spirv) : Spirv(cost_pruned_spirv);
+    case Shader::reduce_pruned: return texels ? Spirv(reduce_pruned_texels_spirv) : Spirv(reduce_pruned_spirv);
     case Shader::assign: break;
   }
   return texels ? Spirv(assign_texels_spirv) : Spirv(assign_spirv);
@@ -55,7 +64,8 @@ bool has_shader(ModelKind kind) noexcept {
 
 Pipelines::Pipelines(const Device& device, const std::filesystem::path& cache_folder)
     : device_(device), cache_(device, cache_folder), set_layout_(make_set_layout(device)), layout_(make_layout(device, *set_layout_)) {
-  for (const Shader shader : {Shader::cost, Shader::reduce, Shader::distances, Shader::assign}) {
+  for (const Shader shader :
+       {Shader::cost, Shader::reduce, Shader::distances, Shader::assign, Shader::bound, Shader::cost_pruned, Shader::reduce_pruned}) {
     const Spirv code = spirv(shader, device.traits().texels);
     modules_.emplace_back(device.handle(), vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data()));
   }
@@ -86,6 +96,7 @@ vk::Pipeline Pipelines::get(const Specialisation& wanted) {
   values[layout::kSpecDimension] = wanted.dimension;
   values[layout::kSpecTile] = wanted.tile;
   values[layout::kSpecWork] = wanted.work;
+  values[layout::kSpecSpan] = wanted.span;
   std::array<vk::SpecializationMapEntry, layout::kSpecCount> entries;
   for (std::uint32_t i = 0; i < entries.size(); ++i) entries[i] = vk::SpecializationMapEntry(i, i * 4, 4);
   const vk::SpecializationInfo constants(static_cast<std::uint32_t>(entries.size()), entries.data(), sizeof values, values.data());

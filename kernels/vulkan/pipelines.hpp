@@ -11,7 +11,7 @@
 
 namespace swarmfit::kernels::vulkan {
 
-enum class Shader : std::uint32_t { cost, reduce, distances, assign };
+enum class Shader : std::uint32_t { cost, reduce, distances, assign, bound, cost_pruned, reduce_pruned };
 
 /// What a pipeline is specialised for; see shaders/layout.h.
 struct Specialisation {
@@ -22,6 +22,7 @@ struct Specialisation {
   std::uint32_t dimension = 3;
   std::uint32_t tile = 4;
   std::uint32_t work = 1;
+  std::uint32_t span = 32;
   auto operator<=>(const Specialisation&) const = default;
 };
 

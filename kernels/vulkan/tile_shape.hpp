@@ -24,6 +24,9 @@ struct TileShape {
 };
 TileShape tile_shape(const DeviceTraits& device, std::size_t particles, int coefficients);
 
+/// Particles that a group looks at in a pruned swarm: a multiple of 32, of which the open ones fill tiles.
+inline constexpr std::uint32_t kSpan = 64;
+
 /// Particles a tile may have at most; smaller ones divide it.
 std::uint32_t largest_tile(const DeviceTraits& device);
 

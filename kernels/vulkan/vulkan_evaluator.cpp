@@ -8,6 +8,7 @@
 #include "kernels/checks.hpp"
 #include "kernels/evaluators.hpp"
 #include "kernels/own/own_passes.hpp"
+#include "kernels/pruning_pause.hpp"
 #include "kernels/vulkan/commands.hpp"
 #include "kernels/vulkan/guarded.hpp"
 #include "shaders/layout.h"
@@ -16,6 +17,8 @@ namespace swarmfit::kernels {
 namespace vulkan {
 namespace {
 
+/// Shares of the residuals above which pruning does not pay. Measured on lavapipe; a GPU's is the processor's, for want of one to measure.
+constexpr double kPoorInSoftware = 0.6, kPoor = 0.8;
 constexpr std::size_t kSmallestRange = 16384;  // a tile of particles and a chunk of points on any device
 
 class VulkanEvaluator final : public FitnessEvaluator {
@@ -25,9 +28,10 @@ class VulkanEvaluator final : public FitnessEvaluator {
         physical_(std::move(physical)),
         device_(physical_, options),
         pipelines_(device_, options.pipeline_cache),
-        cloud_(device_),
+        cloud_(device_, options.pruning && !options.own),
         commands_(device_, pipelines_),
-        identity_{"vulkan", device_.traits().name} {}
+        identity_{"vulkan", device_.traits().name},
+        pruning_(device_.traits().software ? kPoorInSoftware : kPoor) {}
 
   /// Takes this model in place of those that are built in. Before anything else.
   Result<> adopt(std::shared_ptr<const OwnModel> own);
@@ -48,7 +52,8 @@ class VulkanEvaluator final : public FitnessEvaluator {
  private:
   ModelTraits traits_of(ModelKind kind) const noexcept { return own_ ? own_->traits() : traits(kind); }
   bool centred(ModelKind kind, const double* parameters, double* coefficients) const;
-  void evaluate_slice(const SwarmView& swarm, Loss loss, std::span<float> costs);
+  void evaluate_slice(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs);
+  void write_for_pruning(ModelKind kind, float cutoff, std::span<float> row) const;
   bool write_model(ModelKind kind, const double* parameters, std::span<float> row) const;
   template <class T, class Out>
   void read_output(std::span<Out> out);
@@ -61,6 +66,7 @@ class VulkanEvaluator final : public FitnessEvaluator {
   Commands commands_;
   Identity identity_;
   std::shared_ptr<const OwnModel> own_;
+  PruningPause pruning_;
   int dimension_ = 0;
   Effort effort_;
 };
@@ -86,6 +92,7 @@ Support VulkanEvaluator::supports(const Workload& workload) const {
 Result<> VulkanEvaluator::set_points(const PointsView& points) {
   if (auto ok = check_points(points); !ok) return ok;
   dimension_ = 0;  // until all of it has worked
+  pruning_.forget();
   auto done = guarded("set_points", Failure::Kind::device, [&]() -> Result<> {
     Extent extent = measure(points);
     if (own_ && !own_->recentre) std::fill_n(extent.centre, kMaxDimension, 0.0);
@@ -100,6 +107,7 @@ Result<> VulkanEvaluator::set_points(const PointsView& points) {
 
 Result<> VulkanEvaluator::set_caps(std::span<const float> caps) {
   if (auto ok = check_caps(caps, cloud_.extent().finite); !ok) return ok;
+  pruning_.forget();
   return guarded("set_caps", Failure::Kind::device, [&]() -> Result<> {
     cloud_.write_caps(caps);
     return {};
@@ -113,27 +121,39 @@ Result<> VulkanEvaluator::evaluate(const SwarmView& swarm, Loss loss, std::span<
     const std::size_t limit = commands_.swarm_limit();
     for (std::size_t j = 0; j < swarm.count; j += limit) {
       const std::size_t count = std::min(limit, swarm.count - j);
-      evaluate_slice({swarm.kind, count, swarm.parameters.subspan(j * width, count * width)}, loss, costs.subspan(j, count));
+      evaluate_slice({swarm.kind, count, swarm.parameters.subspan(j * width, count * width)}, loss,
+                     cutoffs.empty() ? cutoffs : cutoffs.subspan(j, count), costs.subspan(j, count));
     }
     return {};
   });
   if (!done) return done;
   effort_.evaluations += swarm.count;
   effort_.point_models += swarm.count * cloud_.extent().finite_count;
-  effort_.touched += swarm.count * cloud_.extent().finite_count;
   return {};
 }
 
-void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::span<float> costs) {
-  const auto width = static_cast<std::size_t>(traits_of(swarm.kind).parameter_count);
+void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs) {
+  const ModelTraits model = traits_of(swarm.kind);
+  const auto width = static_cast<std::size_t>(model.parameter_count);
+  // In software a residual of three multiply-adds costs less than to see whether it is needed.
+  const bool worth = model.bounded && !(device_.traits().software && model.affine);
+  const bool pruned = cloud_.bounded() && worth && pruning_.now();
   const std::span<float> rows = commands_.coefficients(swarm.count);
   for (std::size_t j = 0; j < swarm.count; ++j) {
-    write_model(swarm.kind, swarm.parameters.data() + j * width, rows.subspan(j * layout::kCoefficientStride, layout::kCoefficientStride));
+    const std::span<float> row = rows.subspan(j * layout::kCoefficientStride, layout::kCoefficientStride);
+    write_model(swarm.kind, swarm.parameters.data() + j * width, row);
+    if (pruned) write_for_pruning(swarm.kind, cutoffs.empty() ? std::numeric_limits<float>::infinity() : cutoffs[j], row);
   }
+  const std::uint64_t all = std::uint64_t{swarm.count} * cloud_.extent().finite_count;
   if (cloud_.segments().empty()) {
     std::fill(costs.begin(), costs.end(), 0.0F);
+  } else if (pruned) {
+    const std::uint64_t touched = std::min(all, commands_.pruned_costs(swarm.kind, model.coefficient_count, loss, costs));
+    effort_.touched += touched;
+    pruning_.note(static_cast<double>(touched) / static_cast<double>(all));
   } else {
-    commands_.costs(swarm.kind, traits_of(swarm.kind).coefficient_count, loss, costs);
+    commands_.costs(swarm.kind, model.coefficient_count, loss, costs);
+    effort_.touched += all;
   }
   for (std::size_t j = 0; j < swarm.count; ++j) {
     double k[kMaxCoefficients];
@@ -163,6 +183,12 @@ bool VulkanEvaluator::write_model(ModelKind kind, const double* parameters, std:
   }
   row[layout::kKindSlot] = static_cast<float>(kind);
   return finite;
+}
+
+void VulkanEvaluator::write_for_pruning(ModelKind kind, float cutoff, std::span<float> row) const {
+  row[layout::kSlackSlot] = residual_rounding(kind, row.data(), cloud_.reach().data());
+  row[layout::kSteepSlot] = residual_steepness(kind, row.data());
+  row[layout::kCutoffSlot] = cutoff;
 }
 
 template <class T, class Out>
