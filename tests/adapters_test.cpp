@@ -239,6 +239,17 @@ TEST(SacSegmentation, FindsThePlaneWithTheMostSupport) {
   EXPECT_NEAR(std::abs(coefficients.values[0]), 1, 1e-2);
 }
 
+TEST(SacSegmentation, CoefficientsHaveNoNegativeZero) {
+  Model model;
+  model.parameters.resize(4);
+  model.parameters << -0.0, 0.0, -1.0, 1.0;
+  ModelCoefficients coefficients;
+  adapters::to_coefficients(model, coefficients);
+  ASSERT_EQ(coefficients.values.size(), 4U);
+  EXPECT_FALSE(std::signbit(coefficients.values[0]));
+  EXPECT_EQ(coefficients.values[2], -1.0F);
+}
+
 TEST(SacSegmentation, RadiusLimits) {
   std::mt19937 generator(3);
   std::normal_distribution<float> normal;

@@ -1,10 +1,14 @@
-// What a terminal gets: completion, the man page, the doctor, tables of 80 columns, and no escape codes in a pipe.
+// What a terminal gets: completion, the man page, the doctor, tables of 80 columns, progress, colours; and no escape codes in a pipe.
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include <pty.h>
 
 #include <gtest/gtest.h>
 
@@ -124,6 +128,45 @@ TEST(CliTerminal, TheDoctorSaysWhetherFitCanRun) {
     std::istringstream lines(outcome.out);
     for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   }
+}
+
+/// What the command writes to a terminal on stderr.
+std::string at_a_terminal(const TemporaryFolder& folder, const std::vector<std::string>& arguments) {
+  int terminal = -1;
+  const pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (child == 0) {
+    ::setenv("TERM", "xterm", 1);
+    ::unsetenv("NO_COLOR");
+    std::vector<std::string> words = {SWARMFIT_COMMAND};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (auto& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const int out = ::open("/dev/null", O_WRONLY);
+    if (::chdir(folder.path().c_str()) == 0 && ::dup2(out, STDOUT_FILENO) >= 0) ::execv(SWARMFIT_COMMAND, argv.data());
+    ::_exit(127);
+  }
+  std::string text;
+  std::array<char, 4096> piece{};
+  for (ssize_t got = 0; (got = ::read(terminal, piece.data(), piece.size())) > 0;) text.append(piece.data(), static_cast<std::size_t>(got));
+  ::waitpid(child, nullptr, 0);
+  ::close(terminal);
+  return text;
+}
+
+TEST(CliTerminal, WhatTakesLongIsToldOnATerminal) {
+  const TemporaryFolder folder;
+  std::string points;
+  for (int i = 0; i < 400; ++i) points += std::to_string(0.05 * (i % 20)) + " " + std::to_string(0.05 * (i / 20)) + " 0\n";
+  folder.put("c.xyz", points);
+  std::vector<std::string> endless = {"fit",       "plane",   "c.xyz",     "--backend",     "cpu", "--iterations",
+                                      "100000000", "--stall", "100000000", "--time-budget", "2500"};
+  const std::string told = at_a_terminal(folder, endless);
+  EXPECT_TRUE(std::regex_search(told, std::regex("[0-9] s: .*about [0-9]+ s left"))) << told;
+  EXPECT_TRUE(told.ends_with("\r\033[K")) << told;  // and taken away again
+  endless.emplace_back("--quiet");
+  EXPECT_EQ(at_a_terminal(folder, endless), "");
+  EXPECT_NE(at_a_terminal(folder, {"fit", "blob", "c.xyz"}).find("\033["), std::string::npos);
 }
 
 TEST(CliTerminal, VerboseTellsOnStderrAndAPipeGetsNoColours) {

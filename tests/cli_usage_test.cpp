@@ -1,4 +1,8 @@
 // Wrong usage is answered with one line and exit code 2, help and version with 0.
+#include <sstream>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "tests/cli_runner.hpp"
@@ -27,6 +31,19 @@ TEST(CliUsage, HelpAndVersion) {
     EXPECT_NE(fit_help.out.find(option), std::string::npos) << option;
   }
   EXPECT_TRUE(run_swarmfit(folder, {"--version"}).out.starts_with("swarmfit 0."));
+}
+
+TEST(CliUsage, HelpFitsEightyColumns) {
+  const TemporaryFolder folder;
+  for (const auto& command : std::vector<std::vector<std::string>>{
+           {}, {"fit"}, {"perceive"}, {"learn"}, {"bench"}, {"devices"}, {"demo"}, {"figures"}, {"doctor"}, {"completion"}, {"man"}}) {
+    std::vector<std::string> words = command;
+    words.emplace_back("--help");
+    std::istringstream lines(run_swarmfit(folder, words).out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+  }
+  // A command that is too long goes on as a shell reads it.
+  EXPECT_NE(run_swarmfit(folder, {"perceive", "--help"}).out.find(" \\\n      "), std::string::npos);
 }
 
 TEST(CliUsage, UnknownWords) {

@@ -1,5 +1,6 @@
 // The command `swarmfit`: parses, dispatches, and turns whatever goes wrong into one line and an exit code.
 #include <exception>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 
 #include "host/cli/commands.hpp"
 #include "host/cli/console.hpp"
+#include "host/cli/help_format.hpp"
 #include "host/cli/help_tree.hpp"
 #include "host/cli/process.hpp"
 
@@ -52,6 +54,7 @@ int run(int argc, const char* const* argv) {
                        fmt::format("swarmfit {}.{}.{}", SWARMFIT_VERSION_MAJOR, SWARMFIT_VERSION_MINOR, SWARMFIT_VERSION_PATCH));
   app.require_subcommand(1);
   app.footer(kFooter);
+  app.formatter(std::make_shared<HelpFormatter>());
   app.get_formatter()->column_width(32);
   const std::vector<Command> commands = {add_fit(app),  add_perceive(app), add_learn(app),  add_bench(app),      add_devices(app),
                                          add_demo(app), add_figures(app),  add_doctor(app), add_completion(app), add_man(app)};

@@ -7,6 +7,9 @@
 #include <fmt/format.h>
 
 namespace swarmfit::cli {
+
+std::string count(std::size_t n, const char* thing) { return fmt::format("{} {}{}", n, thing, n == 1 ? "" : "s"); }
+
 namespace {
 
 /// Characters as they show on a terminal: the bytes that start one.
@@ -102,8 +105,6 @@ std::string models_table(const FitResult& result) {
   }
   return table(rows);
 }
-
-std::string count(std::size_t n, const char* thing) { return fmt::format("{} {}{}", n, thing, n == 1 ? "" : "s"); }
 
 std::string head(const FitResult& result, const Cloud& input) {
   std::string out = fmt::format("{} points", input.size());

@@ -1,6 +1,7 @@
 // The summary a person reads.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,9 @@
 #include <swarmfit/perception.hpp>
 
 namespace swarmfit::cli {
+
+/// "1 plane", "2 planes".
+std::string count(std::size_t n, const char* thing);
 
 /// Rows of cells, printed with columns lined up; numbers to the right. Cells are wrapped so that a line has 80 columns, if words allow it.
 std::string table(const std::vector<std::vector<std::string>>& rows);

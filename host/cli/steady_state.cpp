@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
+#include "host/cli/report.hpp"
+
 namespace swarmfit::cli {
 namespace {
 
 constexpr std::size_t kEarly = 50;  // memory after this many frames is what the end is held against
-
-std::string count(std::size_t n, const char* thing) { return fmt::format("{} {}{}", n, thing, n == 1 ? "" : "s"); }
 
 }  // namespace
 

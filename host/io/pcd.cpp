@@ -19,15 +19,15 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "PCD's binary data is little endian");
 
 /// The fields that make a cloud.
-struct Wanted {
+struct WantedFields {
   std::array<const PcdField*, 3> xyz{};
   const PcdField* packed = nullptr;           ///< rgb or rgba
   std::array<const PcdField*, 3> channels{};  ///< r, g, b; all or none
   bool coloured() const noexcept { return packed || channels[0]; }
 };
 
-Expected<Wanted> wanted_fields(const std::filesystem::path& file, const PcdHeader& header) {
-  Wanted wanted;
+Expected<WantedFields> wanted_fields(const std::filesystem::path& file, const PcdHeader& header) {
+  WantedFields wanted;
   for (std::size_t d = 0; d < 3; ++d) {
     const std::string_view name = std::array<std::string_view, 3>{"x", "y", "z"}[d];
     wanted.xyz[d] = header.find(name);
@@ -65,7 +65,7 @@ Column column_of(const PcdField& field, const PcdHeader& header, const char* dat
   return column;
 }
 
-void gather_fields(const PcdHeader& header, const Wanted& wanted, const char* data, bool field_by_field, Cloud& cloud) {
+void gather_fields(const PcdHeader& header, const WantedFields& wanted, const char* data, bool field_by_field, Cloud& cloud) {
   const auto column = [&](const PcdField* field) { return column_of(*field, header, data, field_by_field); };
   const std::array<Column, 3> xyz = {column(wanted.xyz[0]), column(wanted.xyz[1]), column(wanted.xyz[2])};
   std::optional<ColourColumns> colour;
@@ -74,14 +74,14 @@ void gather_fields(const PcdHeader& header, const Wanted& wanted, const char* da
   gather(xyz, colour, header.points, cloud);
 }
 
-Expected<> read_binary(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted,
+Expected<> read_binary(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const WantedFields& wanted,
                        Cloud& cloud) {
   if (auto ok = check_surplus(file, payload.substr(header.points * header.point_bytes), header.points); !ok) return ok;
   gather_fields(header, wanted, payload.data(), false, cloud);
   return {};
 }
 
-Expected<> read_compressed(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted,
+Expected<> read_compressed(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const WantedFields& wanted,
                            Cloud& cloud) {
   std::array<std::uint32_t, 2> sizes{};  // compressed, uncompressed
   if (payload.size() < sizeof sizes) return bad_input(file, "ends before the sizes of the compressed data");
@@ -110,7 +110,7 @@ struct Role {
   const PcdField* field = nullptr;
 };
 
-std::vector<Role> roles(const PcdHeader& header, const Wanted& wanted) {
+std::vector<Role> roles(const PcdHeader& header, const WantedFields& wanted) {
   std::vector<Role> out;
   for (const PcdField& field : header.fields) {
     Role role{Role::Kind::skip, 0, field.type, &field};
@@ -149,7 +149,7 @@ bool take(const Role& role, std::string_view token, std::size_t point, Cloud& cl
   return false;
 }
 
-Expected<> read_ascii(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const Wanted& wanted,
+Expected<> read_ascii(const std::filesystem::path& file, std::string_view payload, const PcdHeader& header, const WantedFields& wanted,
                       Cloud& cloud) {
   std::uint64_t tokens = 0;
   for (const auto& field : header.fields) tokens += field.count;

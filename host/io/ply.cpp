@@ -15,18 +15,18 @@ namespace swarmfit::io {
 namespace {
 
 /// Which property of `vertex` holds what; -1 for none.
-struct Wanted {
+struct WantedProperties {
   std::array<int, 3> xyz{-1, -1, -1};
   std::array<int, 3> rgb{-1, -1, -1};
   bool coloured() const noexcept { return rgb[0] >= 0 && rgb[1] >= 0 && rgb[2] >= 0; }
 };
 
-Expected<Wanted> wanted_properties(const std::filesystem::path& file, const PlyElement& vertex) {
+Expected<WantedProperties> wanted_properties(const std::filesystem::path& file, const PlyElement& vertex) {
   const auto index_of = [&](std::string_view name) {
     const PlyProperty* p = vertex.find(name);
     return p && !p->list_count ? static_cast<int>(p - vertex.properties.data()) : -1;
   };
-  Wanted wanted{{index_of("x"), index_of("y"), index_of("z")}, {index_of("red"), index_of("green"), index_of("blue")}};
+  WantedProperties wanted{{index_of("x"), index_of("y"), index_of("z")}, {index_of("red"), index_of("green"), index_of("blue")}};
   for (std::size_t d = 0; d < 3; ++d) {
     if (wanted.xyz[d] < 0) return bad_input(file, "element 'vertex' has no property {}", "xyz"[d]);
   }
@@ -74,7 +74,7 @@ const char* step_over_all(const PlyElement& element, const char* at, const char*
 }
 
 /// Vertices with lists have no fixed size: their wanted properties are copied out first.
-Expected<> gather_with_lists(const std::filesystem::path& file, const PlyElement& vertex, const Wanted& wanted, std::string_view payload,
+Expected<> gather_with_lists(const std::filesystem::path& file, const PlyElement& vertex, const WantedProperties& wanted, std::string_view payload,
                              bool swapped, Cloud& cloud) {
   std::vector<const char*> starts(vertex.properties.size());
   const char* at = payload.data();
@@ -101,7 +101,7 @@ Expected<> gather_with_lists(const std::filesystem::path& file, const PlyElement
   return {};
 }
 
-void gather_fixed(const PlyElement& vertex, const Wanted& wanted, const char* data, bool swapped, Cloud& cloud) {
+void gather_fixed(const PlyElement& vertex, const WantedProperties& wanted, const char* data, bool swapped, Cloud& cloud) {
   const auto column = [&](int p) {
     std::size_t offset = 0;
     for (int i = 0; i < p; ++i) offset += size_of(vertex.properties[static_cast<std::size_t>(i)].type);
@@ -114,7 +114,7 @@ void gather_fixed(const PlyElement& vertex, const Wanted& wanted, const char* da
 }
 
 Expected<> read_binary(const std::filesystem::path& file, std::string_view payload, const PlyHeader& header, std::size_t vertex_index,
-                       const Wanted& wanted, Cloud& cloud) {
+                       const WantedProperties& wanted, Cloud& cloud) {
   static_assert(std::endian::native == std::endian::little, "big endian machines would swap the other way round");
   const bool swapped = header.format == PlyHeader::Format::big_endian;
   const char* at = payload.data();
@@ -176,7 +176,7 @@ Expected<> read_ascii_vertex(const std::filesystem::path& file, TextCursor& curs
 }
 
 Expected<> read_ascii(const std::filesystem::path& file, std::string_view payload, const PlyHeader& header, std::size_t vertex_index,
-                      const Wanted& wanted, Cloud& cloud) {
+                      const WantedProperties& wanted, Cloud& cloud) {
   const PlyElement& vertex = header.elements[vertex_index];
   std::vector<int> slots(vertex.properties.size(), -1);
   for (std::size_t d = 0; d < 3; ++d) {

@@ -1,7 +1,7 @@
 // Where points are drawn: as they are in space, flat in a plane, or the two images of point pairs beside each other.
 
 /** The value below which so many of a sorted sample lie. */
-const quantile = (sorted, share) => sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
+export const quantile = (sorted, share) => sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 
 function boxOf(positions, low, high) {
   const count = positions.length / 3, step = Math.max(1, Math.floor(count / 20000));
@@ -42,10 +42,18 @@ function beside(cloud) {
   return {positions, frames};
 }
 
+/** Some of the points. */
+function sampleOf(positions) {
+  const count = positions.length / 3, step = Math.max(1, Math.floor(count / 20000)), sample = [];
+  for (let i = 0; i < count; i += step) sample.push(positions.subarray(3 * i, 3 * i + 3));
+  return sample;
+}
+
 export function lay(cloud) {
   const pairs = cloud.dimension === 4;
   const {positions, frames} = pairs ? beside(cloud) : {positions: spread(cloud.columns, cloud.count, cloud.dimension)};
   const flat = cloud.dimension !== 3;
   const box = flat ? boxOf(positions, 0, 1) : boxOf(positions, 0.01, 0.99);
-  return {positions, frames, pairs, flat, box, centre: centreOf(box), radius: radiusOf(box), drawn: positions.length / 3};
+  const sample = sampleOf(positions);
+  return {positions, frames, pairs, flat, box, sample, centre: centreOf(box), radius: radiusOf(box), drawn: positions.length / 3};
 }

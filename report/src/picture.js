@@ -1,4 +1,5 @@
 // The camera's image and what is drawn on it.
+import {apart} from './apart.js';
 import {css, modelColour, objectColour, ramp} from './colours.js';
 import {$, choices, slider} from './dom.js';
 import {distanceColour} from './paint.js';
@@ -118,21 +119,28 @@ export class Picture {
   }
 
   boxes(context) {
-    const many = this.page.result.sois.length > 12;
-    const scale = 1 / this.image.every, size = Math.max(11, Math.round(this.image.width / (many ? 62 : 50)));
+    const {sois} = this.page.result, {width, height, every} = this.image;
+    const many = sois.length > 12, size = Math.max(11, Math.round(width / (many ? 62 : 50)));
     context.font = `600 ${size}px system-ui, sans-serif`;
-    context.textBaseline = 'bottom';
-    this.page.result.sois.forEach((soi, k) => {
-      const [x, y, w, h] = soi.bbox.map((v) => v * scale);
+    context.textBaseline = 'middle';
+    context.lineWidth = Math.max(1, width / 640);
+    const labels = [];
+    sois.forEach((soi, k) => {
+      const [x, y, w, h] = soi.bbox.map((v) => v / every);
       if (w === 0) return;
       const words = soi.recognised[0]?.name ?? String(k + 1), wide = context.measureText(words).width + 8;
-      context.strokeStyle = context.fillStyle = css(objectColour(k + 1));
-      context.lineWidth = Math.max(1, this.image.width / 640);
+      context.strokeStyle = css(objectColour(k + 1));
       if (!many) context.strokeRect(x, y, w, h);
-      const top = Math.max(y, size + 4);
-      context.fillRect(x, top - size - 4, wide, size + 4);
+      labels.push({words, colour: css(objectColour(k + 1)), x: x + wide / 2, y: y - (size + 4) / 2, w: wide, h: size + 4});
+    });
+    // A name that finds no place of its own lies under those of larger things.
+    const places = apart(labels, width, height);
+    labels.reverse().forEach((label, k) => {
+      const {x, y} = places[labels.length - 1 - k] ?? label;
+      context.fillStyle = label.colour;
+      context.fillRect(x - label.w / 2, y - label.h / 2, label.w, label.h);
       context.fillStyle = '#111';
-      context.fillText(words, x + 4, top - 1);
+      context.fillText(label.words, x - label.w / 2 + 4, y + 1);
     });
   }
 

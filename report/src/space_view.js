@@ -1,6 +1,7 @@
 // What is in the 3D view at the moment, its controls, and what is said of the point under the pointer.
 import * as THREE from 'three';
 
+import {apart} from './apart.js';
 import {css, modelColour, neutral, objectColour, ramp, variable} from './colours.js';
 import {$, choices, make, slider, switches} from './dom.js';
 import {called, list, relative, short} from './models.js';
@@ -9,21 +10,18 @@ import {ball, best, dispose, modelShape, stroke, swarm} from './solids.js';
 import {thingName} from './tables.js';
 import {View} from './view.js';
 
-/** The eye of the camera where there was one, else from above and aside. */
+/** The way to the eye of the camera where there was one, else from above and aside; and up. */
 function startOf({about, cloud, layout}) {
-  const away = (direction, times) => layout.centre.map((v, d) => v + times * layout.radius * direction[d]);
+  const unit = (v) => v.map((c) => c / Math.hypot(...v));
   if (cloud.height <= 1) {
     const up = about.up ?? [0, 0, 1], side = Math.abs(up[2]) > 0.7 ? [0.45, -1, 0] : [0.45, 0, 1];
-    const toward = side.map((v, d) => v + 0.75 * up[d]), size = Math.hypot(...toward);
-    return {up, position: away(toward.map((v) => v / size), 2.3)};
+    return {up, toward: unit(side.map((v, d) => v + 0.75 * up[d]))};
   }
   const eye = about.centre.map((v) => -v), look = layout.centre.map((v, d) => v - eye[d]);
   const far = Math.hypot(...look), up = about.up ?? [0, look[2] > 0 ? -1 : 1, 0];
   const side = [look[1] * up[2] - look[2] * up[1], look[2] * up[0] - look[0] * up[2], look[0] * up[1] - look[1] * up[0]];
   // A little to the side and above: from the eye itself a frame looks flat.
-  const lean = eye.map((v, d) => v + 0.16 * side[d] + 0.1 * far * up[d]);
-  const toward = lean.map((v, d) => v - layout.centre[d]), size = Math.hypot(...toward);
-  return {up, position: away(toward.map((v) => v / size), Math.max(1.8, Math.min(size / layout.radius, 2.1)))};
+  return {up, toward: unit(eye.map((v, d) => v + 0.16 * side[d] + 0.1 * far * up[d] - layout.centre[d]))};
 }
 
 const most = 12;  // names of either kind at once; the largest things come first, and more would hide each other
@@ -100,14 +98,23 @@ export class SpaceView {
     this.view.afterRender.push(() => this.placeTags());
   }
 
+  /** Those of models before those of things, large ones first; none covers another. */
   placeTags() {
-    for (const {shape, element, kind, k} of this.tags) {
-      const {selected} = this;
+    const {selected, view} = this, shown = [];
+    for (const tag of this.tags) {
+      const {shape, element, kind, k} = tag;
       const wanted = this.state.labels && (kind === 'model' ? this.modelShown(k) : this.replay.atEnd) && (selected ? selected.kind === kind && selected.k === k : k <= most);
-      const at = wanted ? this.view.toScreen(shape.userData.anchor.map((v, d) => v + shape.position.getComponent(d))) : undefined;
-      element.hidden = !at;
-      if (at) element.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, -50%)`;
+      const at = wanted ? view.toScreen(shape.userData.anchor.map((v, d) => v + shape.position.getComponent(d))) : undefined;
+      element.hidden = !at || at[0] < 0 || at[1] < 0 || at[0] > view.width || at[1] > view.height;
+      if (element.hidden) continue;
+      tag.size ??= [element.offsetWidth + 3, element.offsetHeight + 3];
+      shown.push({element, x: at[0], y: at[1], w: tag.size[0], h: tag.size[1]});
     }
+    apart(shown, view.width, view.height).forEach((at, k) => {
+      const {element} = shown[k];
+      element.hidden = !at;
+      if (at) element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -50%)`;
+    });
   }
 
   makeFrames() {

@@ -113,7 +113,8 @@ export function timing({result}) {
 }
 
 export function reproduction({about, result}) {
-  $('command').textContent = about.command;
+  // Lines break between words, not within an option.
+  $('command').append(...about.command.split(' ').flatMap((word, k) => [k > 0 ? ' ' : '', make('span', {}, word)]).filter((part) => part !== ''));
   $('copy').addEventListener('click', () => copy(about.command));
   const row = ([name, value], given) => make('tr', {class: given ? 'given' : undefined}, make('td', {}, name), make('td', {}, value));
   $('settings').append(...about.settings.map((s) => row([s.name, s.value], s.given)));

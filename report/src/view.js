@@ -3,6 +3,7 @@ import * as THREE from 'three';
 import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 
 import {variable} from './colours.js';
+import {quantile} from './layout.js';
 import {Shading} from './shading.js';
 
 const pointShader = {
@@ -29,7 +30,7 @@ const pointShader = {
 };
 
 export class View {
-  /** `start`: {position, up} of the camera in the scene's frame. */
+  /** `start`: which way the camera stands from the scene's middle, a unit vector, and up: {toward, up}. */
   constructor(canvas, layout, start) {
     this.canvas = canvas;
     this.layout = layout;
@@ -49,6 +50,7 @@ export class View {
     this.setUpControls();
     this.home();
     this.controls.addEventListener('change', () => this.render());
+    this.controls.addEventListener('start', () => (this.atHome = false));
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
   }
@@ -89,15 +91,36 @@ export class View {
 
   /** Back to where the view began. */
   home() {
-    const {centre, radius, flat} = this.layout;
-    this.camera.position.set(...(flat ? [centre[0], centre[1], 10 * radius] : this.start.position));
+    const {radius, flat} = this.layout;
     this.camera.near = flat ? 0.1 * radius : 0.01 * radius;
     this.camera.far = 100 * radius;
     this.camera.zoom = 1;
-    this.controls.target.set(...centre);
     this.resize();
+    this.goHome();
     this.controls.update();
     this.render();
+  }
+
+  /** The camera as near as it can be with all of the scene in sight, looking at the middle of what it sees. */
+  goHome() {
+    const {centre, radius, flat} = this.layout;
+    this.atHome = true;
+    this.controls.target.set(...centre);
+    this.camera.position.set(centre[0], centre[1], 10 * radius);
+    if (flat) return;
+    const target = this.controls.target, toward = new THREE.Vector3(...this.start.toward);
+    const right = new THREE.Vector3().crossVectors(this.camera.up, toward).normalize(), above = new THREE.Vector3().crossVectors(toward, right);
+    const open = 0.94 * Math.tan((this.camera.fov * Math.PI) / 360), sides = [[right, open * this.camera.aspect], [above, open]];
+    // A point is in sight where it is no further aside than the opening times its distance: each is a bound of distance and shift.
+    // Of a thousand points one may be a stray.
+    const offs = this.layout.sample.map((point) => new THREE.Vector3(...point).sub(target));
+    const reach = sides.map(([axis, opening]) => [1, -1].map((sign) => {
+      const bounds = Float32Array.from(offs, (at) => sign * at.dot(axis) + opening * at.dot(toward)).sort();
+      return quantile(bounds, 0.999);
+    }));
+    const distance = Math.max(0.2 * radius, ...sides.map(([, opening], s) => (reach[s][0] + reach[s][1]) / (2 * opening)));
+    sides.forEach(([axis], s) => target.addScaledVector(axis, (reach[s][0] - reach[s][1]) / 2));
+    this.camera.position.copy(target).addScaledVector(toward, distance);
   }
 
   resize() {
@@ -123,6 +146,7 @@ export class View {
       this.material.uniforms.scale.value = (height * this.pixelRatio) / (2 * Math.tan((this.camera.fov * Math.PI) / 360));
     }
     this.camera.updateProjectionMatrix();
+    if (this.atHome) this.goHome();
     this.render();
   }
 

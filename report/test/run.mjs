@@ -1,5 +1,6 @@
 // Opens pages that the command has written in a headless Chromium, on a desktop and on a phone, light and dark, and uses what is on them.
-//   node run.mjs COMMAND [--shots DIR] [--only NAME,...]      screenshots of every page on every screen go into DIR
+//   node run.mjs COMMAND [--shots DIR] [--only NAME,...] [--screens NAME,...]
+// Screenshots of every page on every screen, or on those named, go into DIR.
 // Ends with 77, and says why, where it cannot be run: no Chromium, no playwright-core. SWARMFIT_CHROMIUM names the browser,
 // SWARMFIT_DATA_DIR captured data, which are looked at too where they are.
 import {execFileSync} from 'node:child_process';
@@ -71,7 +72,7 @@ function cases(folder) {
 
 const [command, ...rest] = process.argv.slice(2);
 const argument = (name) => (rest.includes(name) ? rest[rest.indexOf(name) + 1] : undefined);
-const shots = argument('--shots'), only = argument('--only')?.split(',');
+const shots = argument('--shots'), only = argument('--only')?.split(','), onScreens = argument('--screens')?.split(',');
 const program = browserProgram();
 if (!program) skip('no Chromium on the PATH (on Debian: tools/setup.sh --report)');
 let chromium;
@@ -97,7 +98,7 @@ try {
     const options = ['--backend', 'cpu', '--report', page, '--quiet'];
     execFileSync(resolve(command), [...one.arguments, ...options], {cwd: folder, stdio: ['ignore', 'inherit', 'inherit']});
     for (const [screen, options] of Object.entries(screensOf(Boolean(shots)))) {
-      if (!shots && !one.screens.includes(screen)) continue;
+      if (!(onScreens ?? (shots ? [screen] : one.screens)).includes(screen)) continue;
       const started = Date.now();
       const problems = await usePage(browser, pathToFileURL(page).href, options, one, shots && join(shots, `${one.name}-${screen}`));
       failures += problems.length;

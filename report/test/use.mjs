@@ -13,6 +13,24 @@ async function coloursOf(page, selector) {
   }, png);
 }
 
+/** The larger share of the left and the right edge of an element that is not of that edge's most frequent colour. */
+async function atTheEdges(page, selector) {
+  const png = (await page.locator(selector).screenshot()).toString('base64');
+  return page.evaluate(async (encoded) => {
+    const bytes = Uint8Array.from(atob(encoded), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], {type: 'image/png'}));
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d', {willReadFrequently: true});
+    context.drawImage(image, 0, 0);
+    // The element's own border is above and below, the hint in a corner.
+    const height = image.height - 40;
+    return Math.max(...[3, image.width - 4].map((x) => {
+      const count = new Map();
+      for (const pixel of new Uint32Array(context.getImageData(x, 3, 1, height).data.buffer)) count.set(pixel, (count.get(pixel) ?? 0) + 1);
+      return 1 - Math.max(...count.values()) / height;
+    }));
+  }, png);
+}
+
 const frames = (page, count = 3) =>
   page.evaluate((n) => new Promise((done) => {
     const next = (left) => (left === 0 ? done() : requestAnimationFrame(() => next(left - 1)));
@@ -50,6 +68,23 @@ class Visit {
     this.expect((await page.locator('#image-part').isVisible()) === Boolean(what.image), 'the image is there where it should not be, or the other way round');
   }
 
+  /** Nothing of the scene is cut off, no name covers another, no option of the command is broken over two lines. */
+  async isTidy() {
+    const {page} = this;
+    const ends = await page.evaluate(() => {
+      const tags = [...document.querySelectorAll('#labels > :not([hidden])')];
+      const rects = tags.map((tag) => tag.getBoundingClientRect());
+      const covered = rects.filter((a, k) => rects.slice(0, k).some((b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom));
+      const words = [...document.querySelectorAll('#command span')].filter((word) => word.textContent.startsWith('--'));
+      const line = words.length && parseFloat(getComputedStyle(words[0]).lineHeight);
+      return {covered: covered.length, tags: tags.length, broken: words.filter((word) => word.clientHeight > 1.5 * line).length};
+    });
+    this.expect(ends.covered === 0, `${ends.covered} of ${ends.tags} names cover others`);
+    this.expect(ends.broken === 0, `${ends.broken} options of the command are broken over lines`);
+    const cut = await atTheEdges(page, '#view');
+    this.expect(cut < 0.02, `${(100 * cut).toFixed(0)} % of the view's left and right edge are covered by the scene`);
+  }
+
   async replays() {
     const {page} = this;
     const moment = () => page.locator('#moment').textContent();
@@ -62,7 +97,7 @@ class Visit {
     await this.shoot('search');
     await page.locator('#play').click();
     const before = Number(await page.locator('#time').inputValue());
-    await page.waitForFunction((at) => Number(document.getElementById('time').value) > at, before, {timeout: 60000});
+    await page.waitForFunction((at) => Number(document.getElementById('time').value) > at, before);
     // Where drawing is slow it has come to the end by now, and stopped by itself.
     await page.evaluate(() => document.querySelector('#play[aria-label="Pause"]')?.click());
     this.expect((await page.locator('#play').getAttribute('aria-label')) === 'Play the search', 'the player does not pause');
@@ -148,7 +183,7 @@ class Visit {
       await choice.click();
       await frames(page);
       if ((await choice.getAttribute('data-choice')).startsWith('cost-')) {
-        await page.waitForFunction((was) => document.getElementById('image').toDataURL() !== was, plain, {timeout: 30000});
+        await page.waitForFunction((was) => document.getElementById('image').toDataURL() !== was, plain);
       }
       await this.shoot(`image-${await choice.getAttribute('data-choice')}`);
     }
@@ -159,6 +194,8 @@ class Visit {
 /** Gives what is wrong with the page on this screen, in words. */
 export async function usePage(browser, url, options, what, shots) {
   const context = await browser.newContext(options);
+  context.setDefaultTimeout(120000);  // drawn in software, beside other work, half a million points take their time
+  context.setDefaultNavigationTimeout(120000);
   const page = await context.newPage();
   const visit = new Visit(page, what, shots);
   page.on('console', (message) => {
@@ -171,9 +208,11 @@ export async function usePage(browser, url, options, what, shots) {
   });
   try {
     await page.goto(url);
-    await page.waitForSelector('html[data-ready]', {state: 'attached', timeout: 30000});
+    await page.waitForSelector('html[data-ready]', {state: 'attached'});
     await frames(page, 5);
     await visit.looksRight();
+    await visit.isTidy();
+    await page.evaluate(() => window.scrollTo(0, 0));
     await visit.shoot('top');
     await visit.shoot('whole', true);
     await visit.replays();

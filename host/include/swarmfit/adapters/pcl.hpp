@@ -72,7 +72,7 @@ Cloud to_cloud(const PointCloud& from) {
 template <class ModelCoefficients>
 void to_coefficients(const Model& model, ModelCoefficients& coefficients) {
   coefficients.values.clear();
-  for (const double value : model.parameters) coefficients.values.push_back(static_cast<float>(value));
+  for (const double value : model.parameters) coefficients.values.push_back(static_cast<float>(value) + 0.0F);  // no -0
 }
 
 }  // namespace swarmfit::adapters
