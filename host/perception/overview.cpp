@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "host/common/parallel.hpp"
+#include "host/perception/stereo_normals.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -114,6 +115,7 @@ Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads) {
   cells.finite = static_cast<std::size_t>(std::count_if(cells.points.begin(), cells.points.end(), PointGrid::seen));
   if (frame.passive_stereo && frame.coloured()) {
     overview.textured = find_texture(frame, overview);
+    overview.normals = stereo_normals(cells, overview.textured, threads);
     return overview;
   }
   overview.normals.assign(count, Eigen::Vector3f::Zero());
@@ -126,14 +128,20 @@ Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads) {
 }
 
 std::vector<std::uint32_t> flat_cells(const Overview& overview) {
-  if (overview.has_normals()) return cells_where(overview, [&](std::size_t i) { return overview.normals[i].squaredNorm() > 0; });
+  if (overview.has_normals() && !overview.stereo())
+    return cells_where(overview, [&](std::size_t i) { return overview.normals[i].squaredNorm() > 0; });
   return cells_where(overview, [&](std::size_t i) {
-    return PointGrid::seen(overview.cells.points[i]) && (overview.textured.empty() || overview.textured[i] != 0);
+    return PointGrid::seen(overview.cells.points[i]) && (!overview.stereo() || overview.textured[i] != 0);
   });
 }
 
 std::vector<std::uint32_t> flat_cells(const Overview& overview, const Eigen::Vector3f& normal, float least_cosine) {
   if (!overview.has_normals()) return flat_cells(overview);  // all agree
+  if (overview.stereo()) {
+    auto chosen = flat_cells(overview);
+    std::erase_if(chosen, [&](std::uint32_t i) { return !overview.agrees(i, normal, least_cosine); });
+    return chosen;
+  }
   // Where a cell is not flat its normal is zero, and agrees with nothing.
   return cells_where(overview, [&](std::size_t i) { return overview.agrees(i, normal, least_cosine); });
 }

@@ -19,14 +19,17 @@ struct Overview {
 
   std::vector<std::uint8_t> textured;  ///< passive stereo: 1 where there was something to match; empty: the depth is good everywhere
 
+  bool stereo() const noexcept { return !textured.empty(); }
   bool has_normals() const noexcept { return !normals.empty(); }
-  /// Whether the surface at a cell may belong to a plane with this normal (n and -n are one). True where nothing is known at all.
+  bool knows_normal(std::size_t cell) const noexcept { return has_normals() && normals[cell].squaredNorm() > 0; }
+  /// Whether the surface at a cell may belong to a plane with this normal (n and -n are one). True where nothing is known at all: stereo's
+  /// cells get the benefit of the doubt, since on small surfaces few normals are known.
   bool agrees(std::size_t cell, const Eigen::Vector3f& normal, float least_cosine) const noexcept {
-    return normals.empty() || std::abs(normals[cell].dot(normal)) >= least_cosine;
+    return !has_normals() || (stereo() && !knows_normal(cell)) || std::abs(normals[cell].dot(normal)) >= least_cosine;
   }
 };
 
-/// `frame` is what `grid` was made from. Between textures passive stereo guesses, and its surfaces wave: there are no normals then.
+/// `frame` is what `grid` was made from. Between textures passive stereo guesses: normals are taken from textured cells alone then.
 Overview make_overview(const PointGrid& grid, const Cloud& frame, int threads = 0);
 
 /// Cells on flat surfaces, or with texture where that is what counts; with `normal` only those that agree with it (least_cosine > 0).

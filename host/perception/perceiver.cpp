@@ -94,7 +94,7 @@ struct Perceiver::State {
 
   FitOptions fit_options() const;
   Expected<> suit_sensor(const Cloud& frame);
-  Expected<> find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
+  Expected<> find_vertical(const Cloud& frame, const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                            PerceiveResult& result);
   std::vector<Model> last_planes(const PointGrid& grid) const;
   void find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const;
@@ -123,16 +123,17 @@ Expected<> Perceiver::State::suit_sensor(const Cloud& frame) {
   return fitter->set_options(fit_options());
 }
 
-Expected<> Perceiver::State::find_vertical(const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
-                                           PerceiveResult& result) {
+Expected<> Perceiver::State::find_vertical(const Cloud& frame, const PointGrid& grid, const perception::Overview& overview,
+                                           const std::stop_token& stop, PerceiveResult& result) {
   if (vertical) return {};
-  // Stereo's planes bend, and are told best by all that there are.
+  // Stereo's planes bend, and many of them are slabs through clutter: they are told best by all that there are, and not alone.
   const auto suffice = [&](std::span<const Model> planes, std::size_t left) {
     return !stereo && perception::is_vertical_decided(grid, planes, left, options.horizontal_angle);
   };
   auto planes = perception::find_any_planes(*fitter, overview, suffice, stop);
   if (!planes) return tl::unexpected(planes.error());
-  vertical = perception::vertical_from_planes(grid, planes->models, options.horizontal_angle);
+  const auto edges = stereo ? perception::find_edges(frame, grid) : perception::ImageEdges{};
+  vertical = perception::vertical_from_planes(grid, planes->models, edges, overview.normals, options.horizontal_angle);
   if (vertical) return fitter->set_options(fit_options());
   // Nothing flat in this view; the next one may have it.
   planes->models.clear();
@@ -205,7 +206,7 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   if (grid.finite < 3)
     return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= 3 to perceive", grid.finite, frame.size()));
   const auto overview = perception::make_overview(grid, frame, state_->options.fit.threads);
-  if (auto ok = state_->find_vertical(grid, overview, stop, result); !ok) return tl::unexpected(ok.error());
+  if (auto ok = state_->find_vertical(frame, grid, overview, stop, result); !ok) return tl::unexpected(ok.error());
   result.vertical_source = state_->vertical ? state_->vertical->source : "dominant plane";
   result.popout.assign(frame.size(), 0);
   std::vector<Surface> supports;

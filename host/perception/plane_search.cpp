@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "host/common/parallel.hpp"
+#include "host/perception/stereo_planes.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -20,19 +21,22 @@ constexpr std::size_t kCellsForDirection = 4096;  // at most, that planes of any
 constexpr std::size_t kCellsForSurfaces = 8192;   // and level ones, which are refined on all points afterwards
 constexpr std::size_t kFewCells = 10;             // fewer flat cells hold no surface
 constexpr float kFringeOfPlane = 0.06f;           // [m] a surface reaches this far beyond the cells that tell its direction
+constexpr float kFringeInStereo = 0.12f;          // [m] where few cells tell it
 constexpr float kNoise = 0.0045f;                 // [1 / m] three deviations of a depth, over the range squared
 constexpr int kPointsAtOnce = 16384;              // of a range that one thread works on
 constexpr double kExtentMargin = 0.02;            // [m] things stand a little over the edge of what is seen of a table
 
 /// The cells as a cloud for the fitter; `most` of them, evenly drawn, where there are more and their normals keep clutter away. Stereo's
-/// small supports need every cell.
+/// small supports need every cell, and those whose direction is known several times.
 std::vector<float> gather(const Overview& overview, const std::vector<std::uint32_t>& chosen, std::size_t most) {
-  const std::size_t count = overview.has_normals() ? std::min(chosen.size(), most) : chosen.size();
+  const std::size_t count = overview.has_normals() && !overview.stereo() ? std::min(chosen.size(), most) : chosen.size();
   std::vector<float> values;
   values.reserve(3 * count);
   for (std::size_t k = 0; k < count; ++k) {
-    const Eigen::Vector3f& p = overview.cells.points[chosen[k * chosen.size() / count]];
-    values.insert(values.end(), p.data(), p.data() + 3);
+    const auto cell = chosen[k * chosen.size() / count];
+    const Eigen::Vector3f& p = overview.cells.points[cell];
+    const int times = overview.stereo() && overview.knows_normal(cell) ? kWeightOfKnown : 1;
+    for (int t = 0; t < times; ++t) values.insert(values.end(), p.data(), p.data() + 3);
   }
   return values;
 }
@@ -56,7 +60,8 @@ struct Membership {
 Membership count_members(const Overview& overview, const std::vector<std::uint32_t>& flat, const LocalPlane& plane, float tau) {
   Membership count;
   for (const auto i : flat) {
-    if (std::abs(plane.height(overview.cells.points[i])) > tau) continue;
+    // Of stereo's cells only those of known direction tell.
+    if (std::abs(plane.height(overview.cells.points[i])) > tau || (overview.stereo() && !overview.knows_normal(i))) continue;
     ++count.within;
     count.along += overview.agrees(i, plane.normal, kAlong) ? 1 : 0;
   }
@@ -167,14 +172,15 @@ Surface grow_surface(const Overview& overview, const std::vector<std::uint16_t>&
   Surface surface = lay_axes(plane, model);
   std::vector<Eigen::Vector2f> places, around;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (labels[i] == model)
+    if (labels[i] == model && (!overview.stereo() || overview.knows_normal(i)))
       places.push_back(surface.place_of(points[i]));
     else if (std::abs(plane.height(points[i])) <= tau)  // nor where nothing was seen
       around.push_back(surface.place_of(points[i]));
   }
-  if (!places.empty() && (overview.has_normals() || !overview.textured.empty())) {
-    fill_surface(places, kExtentMargin + static_cast<double>(kFringeOfPlane), surface);
-    const auto beside = surface.near_component(kFringeOfPlane);
+  if (!places.empty() && overview.has_normals()) {
+    const float fringe = overview.stereo() ? kFringeInStereo : kFringeOfPlane;
+    fill_surface(places, kExtentMargin + static_cast<double>(fringe), surface);
+    const auto beside = surface.near_component(fringe);
     for (const auto& place : around)
       if (const int at = surface.cell_at(place); at >= 0 && beside[static_cast<std::size_t>(at)] != 0) places.push_back(place);
   }
@@ -193,6 +199,12 @@ bool stands_out(const Overview& overview, const std::vector<std::uint32_t>& cell
   }
   // The two bands around are twice as thick as the surface.
   return static_cast<double>(within) > kContrast * static_cast<double>(around) / 2;
+}
+
+/// Where normals are good at every cell they have kept clutter away; elsewhere it is told by what lies along the surface and around it.
+bool is_surface(const Overview& overview, const std::vector<std::uint32_t>& cells, const Surface& surface, float tau) {
+  if (overview.has_normals() && !overview.stereo()) return true;
+  return stands_out(overview, cells, surface, tau) && (!overview.stereo() || lies_along(overview, surface, tau));
 }
 
 /// What a range of points adds to one plane.
@@ -338,6 +350,11 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
   fit.models = std::move(models);
   if (too_small) fit.stop_reason = "no plane of reasonable size is left";
 
+  if (overview.stereo())
+    for (std::size_t k = 0; k < planes.size(); ++k) {
+      planes[k] = refine_on_known(overview, flat, planes[k], static_cast<float>(tau), up, fitter.options().prior->max_angle);
+      fit.models[k].parameters << planes[k].normal.cast<double>(), static_cast<double>(planes[k].offset);
+    }
   auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
   if (overview.has_normals()) join_alike(overview, static_cast<float>(fit.threshold), labels, planes, fit.models);
   std::vector<Surface> surfaces(planes.size());
@@ -347,8 +364,9 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
           grow_surface(overview, labels, k + 1, planes[static_cast<std::size_t>(k)], static_cast<float>(fit.threshold));
   });
   settle(grid, surfaces, options.fit.threads, fit);
+  const auto seen = overview.stereo() ? flat_cells(overview) : flat;  // also what lies across
   for (std::size_t k = 0; k < surfaces.size(); ++k)
-    if (!overview.has_normals() && !stands_out(overview, flat, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;
+    if (!is_surface(overview, seen, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;
   erase_models(fit, surfaces, static_cast<std::size_t>(options.min_plane_share * static_cast<double>(grid.finite)));
   const auto supporting = choose_supporting(surfaces, options.max_height);
   for (std::size_t k = 0; k < surfaces.size(); ++k) {

@@ -1,7 +1,10 @@
 #include "host/perception/vertical.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -15,6 +18,14 @@ constexpr double kCeilingWeight = 0.02;
 constexpr double kLeans = 0.35;      // across the image; cameras are seldom rolled
 constexpr double kParallel = 0.995;  // cosine of 6 degrees
 constexpr double kLeanWeight = 0.2;
+constexpr double kSpread = 0.1;     // [rad] of the normals of what is level or upright
+constexpr double kWallShare = 0.3;  // of a level surface's weight: a wall tells one of two angles, and much is upright by chance
+constexpr double kLevel = 0.14;     // [rad] a plane this near tells the vertical better than walls and edges do
+constexpr double kRoll = 0.14;      // [rad] standard deviation of how cameras are rolled
+constexpr double kNearlyAll = 0.9;  // of the cells
+constexpr double kBins = 8;         // to a unit: normals are put together where they are alike to 7 degrees
+constexpr double kMostRoll = 0.52, kMostUpwards = 0.8, kMostDownwards = 1.57;  // [rad] what is tried
+constexpr double kCoarseStep = 0.035, kFineStep = 0.009;                       // [rad]
 constexpr int kLooks = 64;  // at most about so many rays a row tell where the image's bottom is
 
 /// Where the image's right and its bottom lie in the cloud's frame; empty without an image grid.
@@ -53,6 +64,88 @@ double plausibility(const Eigen::Vector3d& normal, const std::optional<ImageAxes
   const double rise = -normal.dot(axes->down), lean = std::abs(normal.dot(axes->right));
   const double weight = rise > kRises ? 1 : rise > -kRises ? kWallWeight : kCeilingWeight;
   return lean < kLeans ? weight : weight * kLeanWeight;
+}
+
+double bell(double angle, double spread) { return std::exp(-0.5 * (angle / spread) * (angle / spread)); }
+
+/// How well a direction would do as the vertical.
+class Uprightness {
+ public:
+  Uprightness(std::span<const Eigen::Vector3f> normals, const ImageEdges& edges, const ImageAxes& axes);
+
+  double operator()(const Eigen::Vector3d& up) const {
+    double score = edges_.share_along(up);
+    for (const Facet& facet : facets_) {
+      const double cosine = std::abs(facet.normal.dot(up));
+      score += facet.as_level * std::exp((cosine - 1) / (kSpread * kSpread)) + kWallShare * facet.share * bell(cosine, kSpread);
+    }
+    return score * bell(std::asin(std::clamp(up.dot(axes_.right), -1.0, 1.0)), kRoll);
+  }
+
+  /// The best direction of all that a camera might have, to kFineStep.
+  Eigen::Vector3d best() const {
+    const Tilt coarse = search({-kMostUpwards, -kMostRoll}, {kMostDownwards, kMostRoll}, kCoarseStep);
+    const Tilt fine =
+        search({coarse.pitch - kCoarseStep, coarse.roll - kCoarseStep}, {coarse.pitch + kCoarseStep, coarse.roll + kCoarseStep}, kFineStep);
+    return direction(fine);
+  }
+
+ private:
+  struct Facet {
+    Eigen::Vector3d normal;  // towards the camera
+    double share, as_level;  // of all cells; the same, by how likely a camera sees a level surface like that
+  };
+  struct Tilt {
+    double pitch, roll;  // [rad] of the camera, downwards and to the right
+  };
+
+  Tilt search(const Tilt& first, const Tilt& last, double step) const {
+    Tilt best = first;
+    double most = -1;
+    for (double pitch = first.pitch; pitch <= last.pitch; pitch += step)
+      for (double roll = first.roll; roll <= last.roll; roll += step)
+        if (const double score = (*this)(direction({pitch, roll})); score > most) {
+          most = score;
+          best = {pitch, roll};
+        }
+    return best;
+  }
+
+  Eigen::Vector3d direction(const Tilt& tilt) const {
+    const Eigen::Vector3d forward = axes_.right.cross(axes_.down),
+                          across = std::sin(tilt.roll) * axes_.right - std::cos(tilt.roll) * axes_.down;
+    return (std::cos(tilt.pitch) * across - std::sin(tilt.pitch) * forward).normalized();
+  }
+
+  const ImageEdges& edges_;
+  ImageAxes axes_;
+  std::vector<Facet> facets_;
+};
+
+Uprightness::Uprightness(std::span<const Eigen::Vector3f> normals, const ImageEdges& edges, const ImageAxes& axes)
+    : edges_(edges), axes_(axes) {
+  std::map<std::array<long, 3>, std::pair<Eigen::Vector3d, double>> bins;  // sum of normals, and how many
+  double cells = 0;
+  for (const auto& normal : normals) {
+    if (normal.squaredNorm() == 0) continue;
+    const std::array<long, 3> key{std::lround(normal.x() * kBins), std::lround(normal.y() * kBins), std::lround(normal.z() * kBins)};
+    auto& [total, count] = bins.try_emplace(key, Eigen::Vector3d::Zero(), 0.0).first->second;
+    total += normal.cast<double>();
+    ++count;
+    ++cells;
+  }
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& [key, bin] : bins) sum += bin.first;
+  double alike = 0;
+  for (const auto& [key, bin] : bins)
+    if (bin.first.normalized().dot(sum.normalized()) > std::cos(kLeans)) alike += bin.second;
+  // Seen from straight above, tables and the things on them are parallel; walls and fronts are not.
+  const bool from_above = alike > kNearlyAll * cells;
+  for (const auto& [key, bin] : bins) {
+    const Eigen::Vector3d normal = bin.first.normalized();
+    const double share = bin.second / cells;
+    facets_.push_back({normal, share, share * (from_above ? 1 : plausibility(normal, axes))});
+  }
 }
 
 struct Weighed {
@@ -110,6 +203,18 @@ std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<co
     }
   }
   return Vertical{normal, kFromDominantPlane};
+}
+
+std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, const ImageEdges& edges,
+                                             std::span<const Eigen::Vector3f> normals, double horizontal_angle) {
+  const auto axes = image_axes(grid);
+  if (edges.list.empty() || normals.empty() || !axes) return vertical_from_planes(grid, planes, horizontal_angle);
+  const Eigen::Vector3d up = Uprightness(normals, edges, *axes).best();
+  const Model* level = nullptr;
+  for (const auto& plane : planes)
+    if (std::abs(plane.normal().dot(up)) > std::cos(kLevel) && (level == nullptr || plane.inliers > level->inliers)) level = &plane;
+  if (level == nullptr) return Vertical{up, kFromEdges};
+  return Vertical{level->normal().dot(up) > 0 ? level->normal() : Eigen::Vector3d(-level->normal()), kFromDominantPlane};
 }
 
 bool is_vertical_decided(const PointGrid& grid, std::span<const Model> planes, std::size_t left, double horizontal_angle) {
