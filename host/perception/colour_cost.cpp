@@ -6,7 +6,22 @@
 
 namespace swarmfit::perception {
 namespace {
-constexpr std::uint16_t kUnknown = 65535;
+constexpr std::uint16_t kUnknown = 65535, kWanted = 65534;
+constexpr float kWhole = 65533;
+
+std::uint16_t to_steps(float cost) { return static_cast<std::uint16_t>(cost * kWhole + 0.5f); }
+}  // namespace
+
+bool ColourWork::evaluate(const kernels::ColoursView& sample, int neighbours, const kernels::ColoursView& colours, std::span<float> costs) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (failure_) return false;
+  }
+  auto done = costs_.evaluate(sample, neighbours, colours, costs);
+  if (done) return true;
+  const std::lock_guard lock(mutex_);
+  if (!failure_) failure_ = done.error();
+  return false;
 }
 
 Hls to_hls(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
@@ -78,18 +93,49 @@ float ColourSample::cost(const Hls& colour) {
   return sum / static_cast<float>(neighbours_);
 }
 
-float ColourSample::cost(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+std::size_t ColourSample::key(std::uint8_t red, std::uint8_t green, std::uint8_t blue) const {
   const int drop = 8 - bits_;
-  const auto key = (static_cast<std::size_t>(red >> drop) << (2 * bits_)) | (static_cast<std::size_t>(green >> drop) << bits_) |
-                   static_cast<std::size_t>(blue >> drop);
-  std::uint16_t& known = remembered_[key];
-  if (known == kUnknown) {
-    // The middle of the cell stands for all of it.
-    const int middle = drop > 0 ? 1 << (drop - 1) : 0;
-    const auto centre = [&](std::uint8_t x) { return static_cast<std::uint8_t>(((x >> drop) << drop) + middle); };
-    known = static_cast<std::uint16_t>(cost(to_hls(centre(red), centre(green), centre(blue))) * 65534 + 0.5f);
+  return (static_cast<std::size_t>(red >> drop) << (2 * bits_)) | (static_cast<std::size_t>(green >> drop) << bits_) |
+         static_cast<std::size_t>(blue >> drop);
+}
+
+/// The middle of a key's cell stands for all of it.
+Hls ColourSample::colour_of(std::size_t key) const {
+  const int drop = 8 - bits_, middle = drop > 0 ? 1 << (drop - 1) : 0;
+  const std::size_t mask = (std::size_t{1} << bits_) - 1;
+  const auto channel = [&](int place) {
+    return static_cast<std::uint8_t>(static_cast<int>(((key >> (place * bits_)) & mask) << drop) + middle);
+  };
+  return to_hls(channel(2), channel(1), channel(0));
+}
+
+void ColourSample::want(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  const std::size_t at = key(red, green, blue);
+  if (remembered_[at] != kUnknown) return;
+  remembered_[at] = kWanted;
+  wanted_.push_back(static_cast<std::uint32_t>(at));
+}
+
+void ColourSample::settle(ColourWork* work) {
+  if (work == nullptr || wanted_.empty() || neighbours_ > kernels::kMostNeighbours) return;
+  const std::size_t count = wanted_.size();
+  std::vector<float> columns(3 * count), costs(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Hls colour = colour_of(wanted_[i]);
+    columns[i] = colour.h;
+    columns[count + i] = colour.l;
+    columns[2 * count + i] = colour.s;
   }
-  return static_cast<float>(known) / 65534;
+  const std::span<const float> all(columns);
+  if (work->evaluate({hue_, lightness_, saturation_}, neighbours_, {all.first(count), all.subspan(count, count), all.last(count)}, costs))
+    for (std::size_t i = 0; i < count; ++i) remembered_[wanted_[i]] = to_steps(costs[i]);
+  wanted_.clear();
+}
+
+float ColourSample::cost(std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
+  const std::size_t at = key(red, green, blue);
+  if (remembered_[at] >= kWanted) remembered_[at] = to_steps(cost(colour_of(at)));
+  return static_cast<float>(remembered_[at]) / kWhole;
 }
 
 }  // namespace swarmfit::perception

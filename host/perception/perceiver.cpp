@@ -19,6 +19,8 @@
 #include "host/perception/surface.hpp"
 #include "host/perception/tracking.hpp"
 #include "host/perception/vertical.hpp"
+#include "host/swarm/landscape.hpp"
+#include "kernels/colour_costs.hpp"
 
 namespace swarmfit {
 namespace {
@@ -91,6 +93,7 @@ struct Perceiver::State {
   std::optional<perception::Gallery> gallery;
   perception::Tracker tracker;
   SwarmObserver observer;
+  std::unique_ptr<kernels::ColourCosts> colours;  ///< where the fitter works; made for the first frame with a picture
 
   FitOptions fit_options() const;
   Expected<> suit_sensor(const Cloud& frame);
@@ -98,6 +101,7 @@ struct Perceiver::State {
                            PerceiveResult& result);
   std::vector<Model> last_planes(const PointGrid& grid) const;
   void find_objects(const PointGrid& grid, const std::vector<Surface>& supports, PerceiveResult& result) const;
+  Expected<> find_outlines(const Cloud& frame, PerceiveResult& result);
 };
 
 FitOptions Perceiver::State::fit_options() const {
@@ -172,6 +176,21 @@ void Perceiver::State::find_objects(const PointGrid& grid, const std::vector<Sur
   result.popout = std::move(objects.of_point);
 }
 
+Expected<> Perceiver::State::find_outlines(const Cloud& frame, PerceiveResult& result) {
+  if (!colours) {
+    const BackendInfo where = fitter->backend();
+    kernels::EvaluatorOptions how;
+    how.pipeline_cache = options.fit.pipeline_cache;
+    auto made = kernels::make_colour_costs({where.name, where.device}, options.fit.backend == "auto", how);
+    if (!made) return tl::unexpected(swarm::to_error(made.error()));
+    colours = std::move(*made);
+  }
+  perception::ColourWork work(*colours);
+  result.objects = perception::segment_objects({frame, result.fit.labels, result.popout, result.sois, &work}, options);
+  if (work.failure()) return tl::unexpected(swarm::to_error(*work.failure()));
+  return {};
+}
+
 Perceiver::Perceiver(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Perceiver::~Perceiver() = default;
 Perceiver::Perceiver(Perceiver&&) noexcept = default;
@@ -225,7 +244,7 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   give_to_objects(result.popout, result.fit);
   result.timing_ms.popout = stage.lap();
   if (frame.organised() && frame.coloured() && !stop.stop_requested()) {
-    result.objects = perception::segment_objects({frame, result.fit.labels, result.popout, result.sois}, state_->options);
+    if (auto ok = state_->find_outlines(frame, result); !ok) return tl::unexpected(ok.error());
     result.timing_ms.segment = stage.lap();
     if (state_->gallery) {
       const auto names = state_->gallery->recognise(frame, result.objects, result.sois.size());

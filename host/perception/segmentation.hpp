@@ -7,6 +7,8 @@
 
 #include <swarmfit/perception.hpp>
 
+#include "host/perception/colour_cost.hpp"
+
 namespace swarmfit::perception {
 
 /// What the cut starts from: 3D knowledge on the image grid.
@@ -15,6 +17,7 @@ struct SegmentationInput {
   std::span<const std::uint16_t> plane_labels;  ///< one a pixel: k-th plane, 0 none
   std::span<const std::uint16_t> popout;        ///< one a pixel: k-th SOI, 0 none
   std::span<const SpaceOfInterest> sois;
+  ColourWork* colours = nullptr;  ///< where colour costs are worked out; null: one after another, here
 };
 
 /// objects: one a pixel, 0 background, k the k-th proto-object (that of the k-th SOI), kUncertain.

@@ -131,8 +131,14 @@ class FixationCut {
         const std::uint8_t* rgb = grid_.rgb(grid_.index(rect_.x + x, rect_.y + y));
         (within(y, x) != 0 ? in : out).add(rgb[0], rgb[1], rgb[2]);
       }
-    in.close(kLargestSample);
-    out.close(kLargestSample);
+    for (ColourSample* sample : {&in, &out}) {
+      sample->close(kLargestSample);
+      for (const std::int32_t c : open_) {
+        const std::uint8_t* rgb = grid_.rgb(cells_[static_cast<std::size_t>(c)].pixel);
+        sample->want(rgb[0], rgb[1], rgb[2]);
+      }
+      sample->settle(input_.colours);
+    }
     std::vector<std::int32_t> costs;
     costs.reserve(open_.size());
     for (const std::int32_t c : open_) {

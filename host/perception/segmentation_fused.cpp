@@ -194,11 +194,16 @@ class FusedCut {
       const SoiRegion& region = regions_[k];
       planes_[k] = fit_plane(region);
       SoiColours colours = soi_colours(input_, grid_, region, options_.colour_neighbours, 4, tuning_.largest_sample);
-      for (int y = 0; y < region.rect.height; ++y)
-        for (int x = 0; x < region.rect.width; ++x) {
-          const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
-          if (node_[i] >= 0 && region.distance(y, x) <= reach_) found[k].push_back(weigh(region, i, region.distance(y, x), colours));
-        }
+      const auto for_candidates = [&](const auto& body) {
+        for (int y = 0; y < region.rect.height; ++y)
+          for (int x = 0; x < region.rect.width; ++x) {
+            const std::size_t i = grid_.index(region.rect.x + x, region.rect.y + y);
+            if (node_[i] >= 0 && region.distance(y, x) <= reach_) body(i, region.distance(y, x));
+          }
+      };
+      for_candidates([&](std::size_t i, float) { colours.want(grid_.rgb(i)); });
+      colours.settle(input_.colours);
+      for_candidates([&](std::size_t i, float far) { found[k].push_back(weigh(region, i, static_cast<double>(far), colours)); });
     });
     // From region by region to node by node.
     first_candidate_.assign(active_.size() + 1, 0);

@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "host/perception/colour_cost.hpp"
 #include "host/perception/segmentation.hpp"
 
 namespace swarmfit::perception {
@@ -58,6 +57,15 @@ std::vector<SoiRegion> soi_regions(const SegmentationInput& input, const PixelGr
 /// Colour samples of a space of interest: `object` from its back-projected points, `background` from the others within its sphere.
 struct SoiColours {
   ColourSample object, background;
+
+  void want(const std::uint8_t* rgb) {
+    object.want(rgb[0], rgb[1], rgb[2]);
+    background.want(rgb[0], rgb[1], rgb[2]);
+  }
+  void settle(ColourWork* work) {
+    object.settle(work);
+    background.settle(work);
+  }
 };
 SoiColours soi_colours(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, int neighbours, int bits,
                        std::size_t largest);

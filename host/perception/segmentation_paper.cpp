@@ -115,6 +115,9 @@ class PaperCut {
 PaperCosts paper_costs(const SegmentationInput& input, const PixelGrid& grid, const SoiRegion& region, const PerceiveOptions& options) {
   SoiColours colours = soi_colours(input, grid, region, options.colour_neighbours, kColourBits, kLargestSample);
   const double reach = kSpatialReach * std::min(region.rect.width, region.rect.height);
+  for (int y = 0; y < region.rect.height; ++y)
+    for (int x = 0; x < region.rect.width; ++x) colours.want(grid.rgb(grid.index(region.rect.x + x, region.rect.y + y)));
+  colours.settle(input.colours);
   PaperCosts costs{cv::Mat1d(region.rect.size()), cv::Mat1d(region.rect.size())};
   for (int y = 0; y < region.rect.height; ++y)
     for (int x = 0; x < region.rect.width; ++x) {
