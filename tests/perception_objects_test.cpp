@@ -67,6 +67,13 @@ TEST(Objects, WhatHangsOnAThingIsPartOfIt) {
   EXPECT_EQ(perceive({body, {{0.1, -0.03, 0.035}, {0.04, 0.04, 0.035}, 0.5}}).objects.support.size(), 2u);
 }
 
+TEST(Objects, ACapIsPartOfItsCarton) {
+  const test::Box carton{{0, 0, 0.15}, {0.2, 0.1, 0.15}};
+  // It is seen as about a fifteenth of the carton; twice that is a thing that stands on it.
+  EXPECT_EQ(perceive({carton, {{0, 0, 0.327}, {0.045, 0.036, 0.027}}}).objects.support.size(), 1u);
+  EXPECT_EQ(perceive({carton, {{0, 0, 0.3375}, {0.0625, 0.05, 0.0375}}}).objects.support.size(), 2u);
+}
+
 TEST(Objects, TheFloorOfAVesselJoinsIt) {
   // Four walls around a piece of table.
   const auto scene = perceive({{{0, -0.1, 0.05}, {0.15, 0.005, 0.05}},

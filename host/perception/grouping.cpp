@@ -10,7 +10,7 @@ namespace swarmfit::perception {
 namespace {
 
 constexpr double kFragmentCells = 60;     // smaller pieces are no objects of their own beside a larger one
-constexpr double kFragmentShare = 0.04;   // of the larger one's cells
+constexpr double kFragmentShare = 0.08;   // of the larger one's cells
 constexpr double kHollow = -0.2;          // divergence below which a piece is the inside of something
 constexpr float kRim = 0.03f;             // [m] the inside of a vessel is not higher than its outside
 constexpr double kRimCells = 8;           // [cells] least border of a hollow and its shell
