@@ -99,6 +99,21 @@ TEST(StereoNormals, AreUnknownAcrossAStep) {
   }
 }
 
+Model plane(const Eigen::Vector3d& normal, double offset, std::size_t inliers) {
+  Model model;
+  model.parameters.resize(4);
+  model.parameters << normal.normalized(), offset;
+  model.inliers = inliers;
+  return model;
+}
+
+/// Of a view of a wall with something beside it: boxes' sides.
+std::vector<Eigen::Vector3f> normals_of_shelf(const Eigen::Vector3d& front, const Eigen::Vector3d& side) {
+  std::vector<Eigen::Vector3f> normals(900, front.cast<float>());
+  normals.insert(normals.end(), 300, side.cast<float>());
+  return normals;
+}
+
 /// A shelf before a camera that looks up: a wall with upright posts on it.
 struct Wall {
   Eigen::Vector3d up, right, normal;
@@ -132,14 +147,8 @@ TEST(UprightEdges, AWallSeenFromBelowIsNoTableSeenFromAbove) {
   const auto wall = wall_seen_from_below(0.4);
   const auto cloud = stereo_view(wall, 0.1);
   const auto grid = make_grid(cloud);
-  Model plane;
-  plane.parameters.resize(4);
-  plane.parameters << wall.normal, 2.6;
-  plane.inliers = 5000;
-  // Some of what is before it: boxes' fronts and sides.
-  std::vector<Eigen::Vector3f> normals(900, wall.normal.cast<float>());
-  normals.insert(normals.end(), 300, -wall.right.cast<float>());
-  const std::vector<Model> planes{plane};
+  const auto normals = normals_of_shelf(wall.normal, -wall.right);
+  const std::vector<Model> planes{plane(wall.normal, 2.6, 5000)};
   const auto by_planes = vertical_from_planes(grid, planes, 0.2);
   ASSERT_TRUE(by_planes);
   EXPECT_LT(degrees_between(by_planes->up, wall.normal), 1) << "planes alone mislead here";
@@ -153,12 +162,8 @@ TEST(UprightEdges, ALevelPlaneTellsTheVerticalExactly) {
   const auto wall = wall_seen_from_below(0.4);
   const auto cloud = stereo_view(wall, 0.1);
   const auto grid = make_grid(cloud);
-  Model board;
-  board.parameters.resize(4);
-  board.parameters << -(wall.up + 0.03 * wall.right).normalized(), 0.5;
-  board.inliers = 100;
-  std::vector<Eigen::Vector3f> normals(900, wall.normal.cast<float>());
-  normals.insert(normals.end(), 300, -wall.right.cast<float>());
+  const auto board = plane(-(wall.up + 0.03 * wall.right), 0.5, 100);
+  const auto normals = normals_of_shelf(wall.normal, -wall.right);
   const auto vertical = vertical_from_planes(grid, std::vector<Model>{board}, find_edges(cloud, grid), normals, 0.2);
   ASSERT_TRUE(vertical);
   EXPECT_EQ(vertical->source, kFromDominantPlane);
@@ -175,12 +180,8 @@ TEST(UprightEdges, ATableSeenFromStraightAboveIsOne) {
       },
       0.1);
   const auto grid = make_grid(cloud);
-  Model table;
-  table.parameters.resize(4);
-  table.parameters << up.normalized(), 1.2;
-  table.inliers = 5000;
   const std::vector<Eigen::Vector3f> normals(1000, up.normalized().cast<float>());
-  const auto vertical = vertical_from_planes(grid, std::vector<Model>{table}, find_edges(cloud, grid), normals, 0.2);
+  const auto vertical = vertical_from_planes(grid, std::vector<Model>{plane(up, 1.2, 5000)}, find_edges(cloud, grid), normals, 0.2);
   ASSERT_TRUE(vertical);
   EXPECT_LT(degrees_between(vertical->up, up), 1);
 }

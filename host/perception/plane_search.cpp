@@ -27,16 +27,17 @@ constexpr int kPointsAtOnce = 16384;              // of a range that one thread 
 constexpr double kExtentMargin = 0.02;            // [m] things stand a little over the edge of what is seen of a table
 
 /// The cells as a cloud for the fitter; `most` of them, evenly drawn, where there are more and their normals keep clutter away. Stereo's
-/// small supports need every cell, and those whose direction is known several times.
+/// small supports need every cell whose direction is known, and a share of the others.
 std::vector<float> gather(const Overview& overview, const std::vector<std::uint32_t>& chosen, std::size_t most) {
   const std::size_t count = overview.has_normals() && !overview.stereo() ? std::min(chosen.size(), most) : chosen.size();
   std::vector<float> values;
   values.reserve(3 * count);
+  std::size_t unknown = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const auto cell = chosen[k * chosen.size() / count];
+    if (overview.stereo() && !overview.knows_normal(cell) && ++unknown % kWeightOfKnown != 0) continue;
     const Eigen::Vector3f& p = overview.cells.points[cell];
-    const int times = overview.stereo() && overview.knows_normal(cell) ? kWeightOfKnown : 1;
-    for (int t = 0; t < times; ++t) values.insert(values.end(), p.data(), p.data() + 3);
+    values.insert(values.end(), p.data(), p.data() + 3);
   }
   return values;
 }

@@ -1,6 +1,7 @@
 // Supporting planes in dense stereo, by the few directions that are known in it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -12,7 +13,7 @@
 namespace swarmfit::perception {
 
 /// How many cells of unknown direction one of known direction counts for when planes are fitted: a slab through clutter is made of the former.
-inline constexpr int kWeightOfKnown = 6;
+inline constexpr std::size_t kWeightOfKnown = 6;
 
 /// Least squares over those of the `chosen` cells that lie within tau [m] of the plane and are known to lie along it; the plane itself where
 /// they are too few. Its normal turns to at most `most_angle` [rad] from `up`.
