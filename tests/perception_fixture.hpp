@@ -11,11 +11,21 @@
 #include <Eigen/Geometry>
 
 #include <swarmfit/cloud.hpp>
+#include <swarmfit/model.hpp>
 
 #include "host/perception/grid.hpp"
 #include "host/perception/surface.hpp"
 
 namespace swarmfit::test {
+
+/// normal . x + offset = 0 with so many inliers.
+inline Model plane_model(const Eigen::Vector3d& normal, double offset, std::size_t inliers) {
+  Model model;
+  model.parameters.resize(4);
+  model.parameters << normal.normalized(), offset;
+  model.inliers = inliers;
+  return model;
+}
 
 struct Box {
   Eigen::Vector3d centre, half;  // world: z up, the table at z = 0

@@ -15,9 +15,12 @@
 #include "host/perception/stereo_planes.hpp"
 #include "host/perception/upright.hpp"
 #include "host/perception/vertical.hpp"
+#include "tests/perception_fixture.hpp"
 
 namespace swarmfit::perception {
 namespace {
+
+const auto plane = test::plane_model;
 
 constexpr double kFocal = 600;      // [px]
 constexpr double kBaseline = 0.18;  // [m]
@@ -97,14 +100,6 @@ TEST(StereoNormals, AreUnknownAcrossAStep) {
     EXPECT_EQ(normals[static_cast<std::size_t>(v * kWidth + kWidth / 2)].squaredNorm(), 0);
     EXPECT_GT(normals[static_cast<std::size_t>(v * kWidth + kWidth / 4)].squaredNorm(), 0);
   }
-}
-
-Model plane(const Eigen::Vector3d& normal, double offset, std::size_t inliers) {
-  Model model;
-  model.parameters.resize(4);
-  model.parameters << normal.normalized(), offset;
-  model.inliers = inliers;
-  return model;
 }
 
 /// Of a view of a wall with something beside it: boxes' sides.
@@ -223,9 +218,9 @@ TEST(StereoPlanes, AreRefinedOnWhatIsKnown) {
 TEST(StereoPlanes, ASlabThroughClutterIsNone) {
   for (const double share : {0.05, 0.5}) {
     const auto overview = overview_of_floor(share);
-    const LocalPlane plane{Eigen::Vector3f(0, -1, 0), 1};
+    const LocalPlane level{Eigen::Vector3f(0, -1, 0), 1};
     const std::vector<std::uint16_t> labels(overview.cells.size(), 1);
-    const auto surface = make_surface(overview.cells, labels, 1, plane, 0.02);
+    const auto surface = make_surface(overview.cells, labels, 1, level, 0.02);
     EXPECT_EQ(lies_along(overview, surface, 0.015f), share > 0.15) << share;
   }
 }

@@ -6,13 +6,7 @@
 namespace swarmfit::perception {
 namespace {
 
-Model plane(const Eigen::Vector3d& normal, double offset, std::size_t inliers) {
-  Model model;
-  model.parameters.resize(4);
-  model.parameters << normal.normalized(), offset;
-  model.inliers = inliers;
-  return model;
-}
+const auto plane = test::plane_model;
 
 /// Views of a camera at the origin; the cloud only tells where the image's bottom is.
 PointGrid view(double y_sign = 1, double z_sign = 1) {
