@@ -229,7 +229,7 @@ Expected<> MultiModel::watched_step(Swarm& swarm, std::size_t kind, const Sample
 
 Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate) {
   Settings settings = kinds_[candidate.kind].settings;
-  if (eager_) settings.stall = settings.stall_paid = std::min(settings.stall, settings.eager_stall);
+  if (eager_ && settings.eager_stall > 0) settings.stall = settings.stall_paid = std::min(settings.stall, settings.eager_stall);
   Swarm swarm(space(candidate.kind), settings, random_);
   auto flown = fly(swarm, candidate.kind, round, seeds, caps_, kUnexplained * tau_);
   if (!flown) return tl::unexpected(flown.error());
