@@ -1,6 +1,7 @@
 // Every kind of model is found among outliers, by its preset, and its points are told from the others'.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <random>
 #include <set>
 #include <string>
@@ -68,6 +69,41 @@ TEST_P(FitKinds, SameAnswerOnOneThreadAndTwo) {
   EXPECT_EQ(one->labels, two->labels);
   ASSERT_EQ(one->models.size(), two->models.size());
   for (std::size_t m = 0; m < one->models.size(); ++m) EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
+}
+
+/// One circle of radius 1 about the origin, 60 points with noise, and outliers about it.
+std::vector<double> ring(unsigned seed, double sigma) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> noise(0, sigma);
+  std::vector<double> xy;
+  for (int i = 0; i < 60; ++i) {
+    const double angle = 6.283185307179586 * unit(rng), r = 1 + noise(rng);
+    xy.insert(xy.end(), {r * std::cos(angle), r * std::sin(angle)});
+  }
+  for (int i = 0; i < 120; ++i) xy.push_back(3 * unit(rng) - 1.5);
+  return xy;
+}
+
+TEST(FitCircles, ScatterLessThanTheLeastAbsoluteDeviations) {
+  // Least squares of the circle's own points: 1/60 for the radius and 2/60 for each coordinate of the centre, times sigma^2.
+  constexpr double kSigma = 0.02;
+  constexpr unsigned kScenes = 200;
+  double square = 0;
+  for (unsigned seed = 1; seed <= kScenes; ++seed) {
+    const std::vector<double> xy = ring(seed, kSigma);
+    FitOptions options;
+    options.model = ModelType::circle2d;
+    options.threshold = 2.5 * kSigma;
+    options.max_models = 1;
+    options.backend = "cpu";
+    const auto result = fit(PointsView(std::span<const double>(xy), 2), options);
+    ASSERT_TRUE(result) << result.error().message;
+    ASSERT_EQ(result->models.size(), 1U);
+    square += (result->models[0].parameters - Eigen::Vector3d(0, 0, 1)).squaredNorm();
+  }
+  const double beside_least_squares = square / kScenes / (kSigma * kSigma * 5 / 60);
+  EXPECT_LT(beside_least_squares, 1.67);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, FitKinds,

@@ -1,6 +1,7 @@
 // Labels by the density of a model's points nearby.
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <random>
 #include <span>
 #include <vector>
@@ -72,6 +73,26 @@ TEST(LocalLabels, OutliersBeyondTheEndOfASegmentAreNotItsOwn) {
   EXPECT_GT(beyond, 50);
   EXPECT_GT(denied, 0.85 * beyond);
   EXPECT_GT(within, 0.93 * 1000);
+}
+
+TEST(LocalLabels, AModelThatIsAsDenseAllAlongIsLabelledAsAWhole) {
+  double local = 0, whole = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    std::mt19937 rng(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::normal_distribution<double> noise(0, kSigma);
+    Scene scene;
+    for (int i = 0; i < 60; ++i) scene.add(unit(rng), 0.5 + noise(rng), 1);
+    for (int i = 0; i < 200; ++i) scene.add(unit(rng), unit(rng), 0);
+    const auto distances = from_level(scene, 0.5);
+    local += scene.wrong(swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<std::vector<float>>{distances}, kTau));
+    // Bayes' rule with the true densities: 60 N(d; 0, sigma) of its own against 200.
+    const double reach = kSigma * std::sqrt(2 * std::log(60 / (200 * kSigma * std::sqrt(2 * std::numbers::pi))));
+    std::vector<std::uint16_t> best;
+    for (const float d : distances) best.push_back(static_cast<double>(d) <= reach ? 1 : 0);
+    whole += scene.wrong(best);
+  }
+  EXPECT_LT(local, 1.012 * whole);
 }
 
 TEST(LocalLabels, WithoutOutliersAllWithinTheThresholdAreOwned) {

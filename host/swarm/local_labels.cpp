@@ -10,7 +10,8 @@ namespace {
 
 constexpr float kSlabs = 6;            // each tau wide, on each side of a model: what lies within is along it
 constexpr std::size_t kNear = 16;      // points along the model that tell the densities about one of them
-constexpr double kPrior = 4;           // points' worth of what is known of the model as a whole
+constexpr double kLeastPrior = 4;      // points' worth of what is known of the model as a whole, where the densities along it differ
+constexpr double kMostPrior = 64;      // and where they do not
 constexpr double kLeastBeside = 0.5;   // no place is so empty that an outlier could not be there
 constexpr double kLeft = 0.5;          // what a point within tau that its model was denied still counts for it
 constexpr double kSigmasPerTau = 2.5;  // 98.8 % of a Gaussian lie within tau
@@ -129,11 +130,11 @@ class Reach {
     double all = 0;
     for (const double one : counts_) all += one;
     const double share = along_.size() > 0 ? all / static_cast<double>(along_.size()) : 0.0;
+    const double prior = worth_of_whole(share);
     for (const Asked& one : asked_) {
-      double own = kPrior * share;
-      for (std::size_t k = 0; k < one.count; ++k) own += counts_[one.near[k]];
+      const double own = prior * share + own_near(one);
       const std::uint32_t point = along_.point(one.place);
-      const double beside = kPrior + static_cast<double>(one.count) - own;
+      const double beside = prior + static_cast<double>(one.count) - own;
       if (!(odds(own, beside, static_cast<double>(distances_[point] / tau_)) > 1) || !(distances_[point] < least[point])) continue;
       least[point] = distances_[point];
       labels[point] = label_;
@@ -154,6 +155,27 @@ class Reach {
     std::array<std::uint32_t, kNear> near;
     std::size_t count;
   };
+
+  double own_near(const Asked& asked) const {
+    double own = 0;
+    for (std::size_t k = 0; k < asked.count; ++k) own += counts_[asked.near[k]];
+    return own;
+  }
+
+  /// How many points' worth the model's share as a whole is beside what is near a point: the more, the less the shares along the model
+  /// differ beyond what chance makes of so few neighbours. They are taken to be beta distributed, and their variance tells (method of moments).
+  double worth_of_whole(double share) const {
+    double differs = 0, by_chance = 0;
+    for (const Asked& one : asked_) {
+      if (one.count == 0) continue;
+      const auto n = static_cast<double>(one.count);
+      const double off = own_near(one) / n - share;
+      differs += off * off;
+      by_chance += share * (1 - share) / n;
+    }
+    const double beyond = differs - by_chance, all = share * (1 - share) * static_cast<double>(asked_.size());
+    return beyond * kMostPrior > all ? std::max(kLeastPrior, all / beyond) : kMostPrior;
+  }
 
   Along along_;
   std::span<const float> distances_;

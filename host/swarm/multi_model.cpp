@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "host/swarm/deflation.hpp"
 #include "host/swarm/labelling.hpp"
@@ -123,6 +124,7 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
   static constexpr const char* kNothingPays = "complete: no further model pays for itself";
   int unpaid = 0;
   double saving = 0;
+  eager_ = settings_.eager_stall > 0 && !part_searched_;
   while (stop_reason_.empty()) {
     if (full()) {
       stop_reason_ = "max-models reached";
@@ -141,6 +143,7 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
       if (auto done = take(best, *outcome, on_model, result); !done) return done;
       continue;
     }
+    if (std::exchange(eager_, false)) continue;  // what is not found at once is looked for at length
     if (settings_.deflation == Deflation::parametric) landscapes_[best.kind].deflate_around(best.theta);
     if (*outcome == Outcome::complete) {
       stop_reason_ = "complete: the list of global bests is stable";
@@ -225,7 +228,8 @@ Expected<> MultiModel::watched_step(Swarm& swarm, std::size_t kind, const Sample
 }
 
 Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate) {
-  const Settings& settings = kinds_[candidate.kind].settings;
+  Settings settings = kinds_[candidate.kind].settings;
+  if (eager_ && settings.eager_stall > 0) settings.stall = settings.stall_paid = std::min(settings.stall, settings.eager_stall);
   Swarm swarm(space(candidate.kind), settings, random_);
   auto flown = fly(swarm, candidate.kind, round, seeds, caps_, kUnexplained * tau_);
   if (!flown) return tl::unexpected(flown.error());

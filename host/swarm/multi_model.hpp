@@ -180,6 +180,7 @@ class MultiModel {
   double scale_ = 0;                        // loss of a model that explains nothing
   std::size_t steps_ = 0;                   // of this round's swarms
   std::uint32_t round_ = 0, contests_ = 0;  // swarms flown so far
+  bool eager_ = false;                      // do swarms end soon, until one of them finds nothing?
   bool looked_flat_ = false;                // since the last model was found
   Watch* watch_ = nullptr;
   std::string stop_reason_;

@@ -14,18 +14,19 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
-constexpr double kReach = 3;        // thresholds: how far about the models points tell the noise from what surrounds it
-constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
-constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
-constexpr double kSettled = 0.05;   // relative change of the threshold below which it stays
-constexpr double kAlike = 0.25;     // one below which a search would find the same models
-constexpr int kFreeSteps = 2;       // of the threshold; further ones go half the way, for it may swing between two models' noise
-constexpr int kRounds = 10;         // of search
-constexpr int kSteps = 10;          // of models and threshold in turn, after each
-constexpr double kWidest = 0.25;    // of the cloud's width: a slab that has half the cloud within it tells no noise
-constexpr int kStarts = 3;          // thresholds that a search may start with, each half the one before
-constexpr std::size_t kModels = 4;  // the most prominent ones tell the scale
+constexpr double kSigmas = 2.5;          // 98.8 % of a Gaussian lie within
+constexpr double kReach = 3;             // thresholds: how far about the models points tell the noise from what surrounds it
+constexpr double kGenerous = 0.08;       // first threshold, in units of the cloud's own spread
+constexpr double kLeast = 1e-6;          // no threshold below this, in the same units: float coordinates carry no more
+constexpr double kSettled = 0.05;        // relative change of the threshold below which it stays
+constexpr double kAlike = 0.25;          // one below which a search would find the same models
+constexpr int kFreeSteps = 2;            // of the threshold; further ones go half the way, for it may swing between two models' noise
+constexpr int kRounds = 10;              // of search
+constexpr int kSteps = 10;               // of models and threshold in turn, after each
+constexpr double kWidest = 0.25;         // of the cloud's width: a slab that has half the cloud within it tells no noise
+constexpr int kStarts = 3;               // thresholds that a search may start with, each half the one before
+constexpr std::size_t kModels = 4;       // the most prominent ones tell the scale
+constexpr std::size_t kFirstModels = 2;  // at first, when the scale is not known
 
 }  // namespace
 
@@ -116,13 +117,13 @@ class Estimate {
       }
       const auto weight = significance(*settled);
       if (!weight) return tl::unexpected(weight.error());
-      const double most_growth = starts == 0 && start == kGenerous * unit ? 1 : 1 + kAlike;
-      const bool narrowed = settled->threshold <= most_growth * start;
+      const bool generous = starts == 0 && start == kGenerous * unit;
+      const bool narrowed = settled->threshold <= (generous ? 1 - kAlike : 1 + kAlike) * start;
       if (best.models.empty() || *weight > most) {
         most = *weight;
         best = std::move(*settled);
       }
-      // A threshold that starts generous and still widens may follow a model of what surrounds the models.
+      // A threshold that starts generous and stays or even widens may follow what surrounds the models.
       if (narrowed) break;
       ++starts;
     }
@@ -136,7 +137,7 @@ class Estimate {
     bool widened = false;
     while (rounds_ < kRounds) {
       FitResult result;
-      auto found = search(now.threshold, result);
+      auto found = search(now.threshold, now.models.empty() ? kFirstModels : kModels, result);
       if (!found) return tl::unexpected(found.error());
       if (found->empty()) {
         if (now.models.empty()) {
@@ -155,7 +156,7 @@ class Estimate {
     return now;
   }
 
-  Expected<std::vector<models::Placed>> search(double tau, FitResult& result) {
+  Expected<std::vector<models::Placed>> search(double tau, std::size_t models, FitResult& result) {
     resolve(kinds_, in_.options, in_.finite_points, tau);
     for (Kind& kind : kinds_) {
       kind.settings.joint = false;  // what follows fits the models anew
@@ -163,7 +164,7 @@ class Estimate {
       if (!in_.options.particles && kind.space->closed_form()) kind.settings.particles /= 2;
     }
     Limits limits;
-    limits.max_models = kModels;
+    limits.max_models = models;
     const std::uint64_t seed = in_.options.seed + static_cast<std::uint64_t>(++rounds_);
     MultiModel search(in_.evaluator, kinds_, in_.points, in_.part, seed, limits, in_.spread);
     search.watched_by(in_.watch);

@@ -30,7 +30,7 @@ std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float
 }  // namespace
 
 bool MultiModel::sharpens(const models::ModelSpace& of) const noexcept {
-  const bool asked = settings_.joint && settings_.sharpen && settings_.loss == Loss::truncated_l1;
+  const bool asked = settings_.joint && settings_.sharpen && !is_curved(of.type()) && settings_.loss == Loss::truncated_l1;
   const bool few = points_.finite_count() <= kFewPoints;
   return asked && few && !part_searched_ && !shares_out() && of.freedom() == of.minimal_sample();
 }

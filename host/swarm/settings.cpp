@@ -144,6 +144,8 @@ Settings for_kind(Settings s, ModelType type) {
   if (!s.joint || type == ModelType::plane) return s;
   constexpr int kSoon = 5;  // still steps after which swarms of these kinds find no more
   if (type == ModelType::line2d || type == ModelType::circle2d || type == ModelType::homography) s.stall = kSoon;
+  // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
+  if (type == ModelType::line2d || type == ModelType::circle2d) s.eager_stall = 1;
   if (type == ModelType::line2d) {
     s.particles = 64;  // of two dimensions more of them find no more
     return s;
