@@ -181,11 +181,21 @@ TEST(CliTerminal, VerboseTellsOnStderrAndAPipeGetsNoColours) {
     EXPECT_NE(outcome.err.find(what), std::string::npos) << what << "\n" << outcome.err;
   const auto plain = run_swarmfit(folder, {"fit", "plane", "c.xyz"}), wrong = run_swarmfit(folder, {"fit", "blob", "c.xyz"});
   for (const auto& text : {outcome.err, plain.out, plain.err, wrong.err}) EXPECT_EQ(text.find('\033'), std::string::npos) << text;
-  std::istringstream lines(plain.out);
-  for (std::string line; std::getline(lines, line);) {
-    if (line.starts_with("  ")) {
-      EXPECT_LE(line.size(), 80U) << line;
-    }
+}
+
+TEST(CliTerminal, SummariesFit80Columns) {
+  const TemporaryFolder folder;
+  std::string points;
+  for (int i = 0; i < 400; ++i) points += std::to_string(0.05 * (i % 20)) + " " + std::to_string(0.05 * (i / 20)) + " 0\n";
+  folder.put("c.xyz", points);
+  const std::vector<std::vector<std::string>> calls = {
+      {"fit", "plane", "c.xyz"}, {"fit", "plane", "c.xyz", "--backend", "cpu"}, {"perceive", "c.xyz", "--gravity", "0,0,-1"}};
+  for (const auto& call : calls) {
+    const auto outcome = run_swarmfit(folder, call);
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_NE(outcome.out.find("\nstopped: "), std::string::npos) << outcome.out;
+    std::istringstream lines(outcome.out);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
   }
 }
 

@@ -52,6 +52,15 @@ std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   return lines;
 }
 
+/// A sentence on lines of 80 columns, those after the first set in.
+std::string sentence(const std::string& text) {
+  if (shown(text) <= kLine) return text + "\n";
+  const std::string indent = "  ";
+  std::string out;
+  for (const std::string& line : wrapped(text, kLine - indent.size())) out += (out.empty() ? "" : indent) + line + "\n";
+  return out;
+}
+
 struct Column {
   std::size_t width = 0, least = 0;
 
@@ -109,9 +118,8 @@ std::string models_table(const FitResult& result) {
 std::string head(const FitResult& result, const Cloud& input) {
   std::string out = fmt::format("{} points", input.size());
   if (input.organised()) out += fmt::format(" ({} x {})", input.width, input.height);
-  out +=
-      fmt::format(", {} finite\n{} on {} ({})\n", result.finite_points, result.backend.name, result.backend.device, result.backend.reason);
-  return out;
+  out += fmt::format(", {} finite\n", result.finite_points);
+  return out + sentence(fmt::format("{} on {} ({})", result.backend.name, result.backend.device, result.backend.reason));
 }
 
 std::string sois_table(const PerceiveResult& result) {
@@ -161,24 +169,24 @@ std::string table(const std::vector<std::vector<std::string>>& rows) {
 std::string summary(const FitResult& result, const Cloud& input, double load_ms) {
   std::string out = head(result, input) + count(result.models.size(), "model") + fmt::format(", threshold {:.4g}\n", result.threshold);
   if (!result.models.empty()) out += models_table(result);
-  out += fmt::format("{:.1f} ms (loading {:.1f} ms), {} evaluations, {:.0f} % of points touched; stopped: {}\n", result.total_ms, load_ms,
-                     result.evaluations, 100 * result.points_touched, result.stop_reason);
-  return out;
+  out += sentence(fmt::format("{:.1f} ms (loading {:.1f} ms), {} evaluations, {:.0f} % of points touched", result.total_ms, load_ms,
+                              result.evaluations, 100 * result.points_touched));
+  return out + sentence("stopped: " + result.stop_reason);
 }
 
 std::string summary(const PerceiveResult& result, const Cloud& input) {
   const auto& models = result.fit.models;
   const auto supporting = std::count_if(models.begin(), models.end(), [](const Model& m) { return m.supporting; });
   std::string out = head(result.fit, input);
-  out += fmt::format("{}, {} supporting (*); up is ({:.3f}, {:.3f}, {:.3f}) by {}\n", count(models.size(), "plane"), supporting,
-                     result.up.x(), result.up.y(), result.up.z(), result.vertical_source);
+  out += sentence(fmt::format("{}, {} supporting (*); up is ({:.3f}, {:.3f}, {:.3f}) by {}", count(models.size(), "plane"), supporting,
+                              result.up.x(), result.up.y(), result.up.z(), result.vertical_source));
   if (!models.empty()) out += models_table(result.fit);
   out += fmt::format("{} of interest\n", count(result.sois.size(), "space"));
   if (!result.sois.empty()) out += sois_table(result);
   const auto& t = result.timing_ms;
-  out += fmt::format("{:.1f} ms: fit {:.1f}, pop-out {:.1f}, segment {:.1f}, recognise {:.1f} (loading {:.1f} ms); stopped: {}\n", t.total,
-                     t.fit, t.popout, t.segment, t.recognise, t.load, result.fit.stop_reason);
-  return out;
+  out += sentence(fmt::format("{:.1f} ms: fit {:.1f}, pop-out {:.1f}, segment {:.1f}, recognise {:.1f} (loading {:.1f} ms)", t.total, t.fit,
+                              t.popout, t.segment, t.recognise, t.load));
+  return out + sentence("stopped: " + result.fit.stop_reason);
 }
 
 std::vector<std::string> explanation(const FitResult& result, const Cloud& input) {

@@ -1,4 +1,4 @@
-// The summary a person reads.
+// The summary a person reads, on lines of 80 columns.
 #pragma once
 
 #include <cstddef>
