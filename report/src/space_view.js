@@ -32,9 +32,10 @@ export class SpaceView {
   constructor(page, replay, distances, onHover) {
     Object.assign(this, {page, replay, distances, onHover});
     this.state = {by: 'found', hulls: true, spheres: true, labels: true, particles: true};
-    this.view = new View($('canvas'), page.layout, startOf(page));
+    const balls = page.result.sois.map(({centre, radius}) => ({centre: centre.map((v, d) => v - page.about.centre[d]), radius}));
+    this.view = new View($('canvas'), page.layout, {...startOf(page), balls});
     this.makeModels();
-    this.makeSpheres();
+    this.makeSpheres(balls);
     this.makeTags();
     if (page.layout.pairs) this.makeFrames();
     this.makeControls();
@@ -72,12 +73,11 @@ export class SpaceView {
     });
   }
 
-  makeSpheres() {
-    const {result, about} = this.page;
-    this.spheres = result.sois.map((soi, k) => {
-      const sphere = ball(soi.centre.map((v, d) => v - about.centre[d]), soi.radius, objectColour(k + 1), result.sois.length > most ? 0.07 : 0.14);
-      const up = about.up ?? [0, 0, 1];
-      sphere.userData.anchor = soi.centre.map((v, d) => v - about.centre[d] + soi.radius * up[d]);
+  makeSpheres(balls) {
+    const up = this.page.about.up ?? [0, 0, 1];
+    this.spheres = balls.map(({centre, radius}, k) => {
+      const sphere = ball(centre, radius, objectColour(k + 1), balls.length > most ? 0.07 : 0.14);
+      sphere.userData.anchor = centre.map((v, d) => v + radius * up[d]);
       this.view.scene.add(sphere);
       return sphere;
     });

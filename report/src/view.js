@@ -30,7 +30,10 @@ const pointShader = {
 };
 
 export class View {
-  /** `start`: which way the camera stands from the scene's middle, a unit vector, and up: {toward, up}. */
+  /**
+   * `start`: which way the camera stands from the scene's middle, a unit vector, and up, and what is to be seen whole beside the points:
+   * {toward, up, balls: [{centre, radius}]}.
+   */
   constructor(canvas, layout, start) {
     this.canvas = canvas;
     this.layout = layout;
@@ -113,10 +116,12 @@ export class View {
     const open = 0.94 * Math.tan((this.camera.fov * Math.PI) / 360), sides = [[right, open * this.camera.aspect], [above, open]];
     // A point is in sight where it is no further aside than the opening times its distance: each is a bound of distance and shift.
     // Of a thousand points one may be a stray.
-    const offs = this.layout.sample.map((point) => new THREE.Vector3(...point).sub(target));
+    const fromTarget = (point) => new THREE.Vector3(...point).sub(target);
+    const offs = this.layout.sample.map(fromTarget), balls = this.start.balls.map(({centre, radius}) => ({at: fromTarget(centre), radius}));
     const reach = sides.map(([axis, opening]) => [1, -1].map((sign) => {
-      const bounds = Float32Array.from(offs, (at) => sign * at.dot(axis) + opening * at.dot(toward)).sort();
-      return quantile(bounds, 0.999);
+      const bound = (at) => sign * at.dot(axis) + opening * at.dot(toward);
+      const points = Float32Array.from(offs, bound).sort();
+      return Math.max(quantile(points, 0.999), ...balls.map(({at, radius}) => bound(at) + radius * Math.hypot(1, opening)));
     }));
     const distance = Math.max(0.2 * radius, ...sides.map(([, opening], s) => (reach[s][0] + reach[s][1]) / (2 * opening)));
     sides.forEach(([axis], s) => target.addScaledVector(axis, (reach[s][0] - reach[s][1]) / 2));

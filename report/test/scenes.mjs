@@ -68,7 +68,7 @@ function hit(from, along) {
   const ball = [0.16, 0.02, 0.09], radius = 0.09, off = add(from, ball, -1);
   const b = dot(off, along), root = b * b - dot(off, off) + radius * radius;
   if (root > 0 && -b - Math.sqrt(root) < best.t) best = {t: -b - Math.sqrt(root), colour: [40, 90, 200]};
-  const low = [-0.26, -0.06, 0], high = [-0.1, 0.08, 0.17];
+  const low = [-0.46, -0.24, 0], high = [-0.3, -0.08, 0.24];  // at the edge: its sphere reaches further than any point
   const [near, far] = [0, 1, 2].reduce(([n, f], d) => {
     const [s, e] = [(low[d] - from[d]) / along[d], (high[d] - from[d]) / along[d]];
     return [Math.max(n, Math.min(s, e)), Math.min(f, Math.max(s, e))];
