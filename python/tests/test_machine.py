@@ -76,8 +76,11 @@ def test_fits_side_by_side(corner: np.ndarray) -> None:
 
 @pytest.mark.parametrize("how", ["fit(points, **o)", "fit(points, on_model=print, **o)", "find_models(points, **o).result()"])
 def test_ctrl_c_stops_a_fit(how: str) -> None:
+    # What runs in the background of a script starts with Ctrl-C ignored.
     program = f"""
+import signal
 import numpy as np, swarmfit
+signal.signal(signal.SIGINT, signal.default_int_handler)
 points = np.random.default_rng(1).uniform(size=(300_000, 3))
 o = dict(model="sphere", threshold=0.05, backend="reference", stall=10**8, iterations=10**8)
 print("go", flush=True)
