@@ -4,6 +4,7 @@ import {OrbitControls} from 'three/addons/controls/OrbitControls.js';
 
 import {variable} from './colours.js';
 import {quantile} from './layout.js';
+import {evenly, Pace} from './pace.js';
 import {Shading} from './shading.js';
 
 const pointShader = {
@@ -49,11 +50,19 @@ export class View {
     this.controls = new OrbitControls(this.camera, canvas);
     this.shading = layout.flat ? undefined : new Shading(this.renderer, this.pixelRatio > 1.5 ? 0 : 4);
     this.afterRender = [];
+    this.pace = new Pace(() => this.render());
     this.makePoints();
     this.setUpControls();
     this.home();
-    this.controls.addEventListener('change', () => this.render());
-    this.controls.addEventListener('start', () => (this.atHome = false));
+    this.controls.addEventListener('change', () => {
+      this.pace.move();
+      this.render();
+    });
+    this.controls.addEventListener('start', () => {
+      this.atHome = false;
+      this.pace.hold();
+    });
+    this.controls.addEventListener('end', () => this.pace.release());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
   }
@@ -65,6 +74,7 @@ export class View {
     this.colours = new THREE.BufferAttribute(new Uint8Array(4 * drawn), 4, true);
     this.colours.setUsage(THREE.DynamicDrawUsage);
     this.geometry.setAttribute('colour', this.colours);
+    this.geometry.setIndex(new THREE.BufferAttribute(evenly(drawn), 1));
     this.material = new THREE.ShaderMaterial({
       ...pointShader,
       transparent: true,  // so that they come after the hulls, which show where there are no points
@@ -169,9 +179,12 @@ export class View {
   render() {
     if (this.pending) return;
     this.pending = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.pending = false;
       this.controls.update();
+      const points = this.pace.points(this.layout.drawn);
+      this.geometry.setDrawRange(0, points);
+      this.canvas.dataset.points = `${points} of ${this.layout.drawn}`;
       this.renderer.setClearColor(variable('--view'), 1);
       if (this.shading) {
         this.shading.render(this.scene, this.camera);
@@ -179,6 +192,7 @@ export class View {
         this.renderer.render(this.scene, this.camera);
       }
       for (const call of this.afterRender) call();
+      if (this.pace.moving) requestAnimationFrame((next) => this.pace.took(next - now));
     });
   }
 

@@ -81,7 +81,11 @@ class Visit {
     });
     this.expect(ends.covered === 0, `${ends.covered} of ${ends.tags} names cover others`);
     this.expect(ends.broken === 0, `${ends.broken} options of the command are broken over lines`);
+    // Names may stand at an edge, where they are whole.
+    const showNames = (how) => page.locator('#labels').evaluate((names, visibility) => (names.style.visibility = visibility), how);
+    await showNames('hidden');
     const cut = await atTheEdges(page, '#view');
+    await showNames('');
     this.expect(cut < 0.02, `${(100 * cut).toFixed(0)} % of an edge of the view are covered by the scene`);
   }
 
@@ -164,6 +168,32 @@ class Visit {
     await page.locator('#home').click();
   }
 
+  /** Where pictures come slowly, a view that is turned has fewer points, and all of them again when it stands still. */
+  async keepsPace() {
+    const {page} = this;
+    const box = await page.locator('#canvas').boundingBox();
+    const allDrawn = () => page.waitForFunction(() => /^(\d+) of \1$/.test(document.getElementById('canvas').dataset.points));
+    await allDrawn();
+    // By this clock every picture takes 100 ms.
+    await page.evaluate(() => {
+      const ask = window.ownRequest = window.requestAnimationFrame;
+      let now = performance.now();
+      window.requestAnimationFrame = (call) => ask(() => call((now += 100)));
+    });
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    for (const aside of [20, 40]) {
+      await page.mouse.move(box.x + box.width / 2 + aside, box.y + box.height / 2);
+      await frames(page);
+    }
+    const words = await page.locator('#canvas').getAttribute('data-points'), [turning, all] = words.split(' of ').map(Number);
+    this.expect(turning > 0 && turning < all, `${words} points are drawn while the view is turned slowly`);
+    await page.mouse.up();
+    await allDrawn();
+    await page.evaluate(() => (window.requestAnimationFrame = window.ownRequest));
+    await page.locator('#home').click();
+  }
+
   async looksAtTheImage(touch) {
     const {page} = this;
     await page.locator('#image-part').scrollIntoViewIfNeeded();
@@ -218,7 +248,10 @@ export async function usePage(browser, url, options, what, shots) {
     await visit.replays();
     await visit.selects();
     await visit.tells(Boolean(options.hasTouch));
-    if (!options.hasTouch) await visit.turns();
+    if (!options.hasTouch) {
+      await visit.turns();
+      await visit.keepsPace();
+    }
     if (what.image) await visit.looksAtTheImage(Boolean(options.hasTouch));
   } catch (error) {
     visit.problems.push(error.message.split('\n')[0]);
