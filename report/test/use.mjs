@@ -172,7 +172,10 @@ class Visit {
   async keepsPace() {
     const {page} = this;
     const box = await page.locator('#canvas').boundingBox();
-    const allDrawn = () => page.waitForFunction(() => /^(\d+) of \1$/.test(document.getElementById('canvas').dataset.points));
+    const allDrawn = () => page.waitForFunction(() => {
+      const [drawn, all] = document.getElementById('canvas').dataset.points.split(' of ');
+      return drawn === all;
+    });
     await allDrawn();
     // By this clock every picture takes 100 ms.
     await page.evaluate(() => {
