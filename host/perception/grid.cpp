@@ -4,6 +4,8 @@
 #include <atomic>
 #include <limits>
 
+#include <Eigen/Eigenvalues>
+
 #include "host/common/parallel.hpp"
 
 namespace swarmfit::perception {
@@ -74,6 +76,20 @@ PointGrid make_grid(const Cloud& frame, int threads) {
   grid.height = frame.organised() ? frame.height : 1;
   if (grid.organised()) grid.pitch = measure_pitch(grid);
   return grid;
+}
+
+PlaneFit fit_plane(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> members, const Eigen::Vector3d& side) {
+  PlaneFit fit{side, Eigen::Vector3d::Zero()};
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const auto i : members) fit.mean += points[i].cast<double>();
+  fit.mean /= static_cast<double>(members.size());
+  for (const auto i : members) {
+    const Eigen::Vector3d d = points[i].cast<double>() - fit.mean;
+    spread += d * d.transpose();
+  }
+  fit.normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
+  if (fit.normal.dot(side) < 0) fit.normal = -fit.normal;
+  return fit;
 }
 
 }  // namespace swarmfit::perception

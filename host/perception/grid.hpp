@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -33,6 +34,14 @@ struct LocalPlane {
   float offset = 0;
   float height(const Eigen::Vector3f& p) const noexcept { return normal.dot(p) + offset; }
 };
+
+/// The plane of least squares through points: their mean is on it.
+struct PlaneFit {
+  Eigen::Vector3d normal, mean;
+  LocalPlane plane() const { return {normal.cast<float>(), static_cast<float>(-normal.dot(mean))}; }
+};
+/// Through those of the points that are listed, three at least; its normal is on the side of `side`.
+PlaneFit fit_plane(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> members, const Eigen::Vector3d& side);
 
 PointGrid make_grid(const Cloud& frame, int threads = 0);
 

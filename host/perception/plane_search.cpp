@@ -4,8 +4,6 @@
 #include <cmath>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
-
 #include "host/common/parallel.hpp"
 #include "host/perception/stereo_planes.hpp"
 
@@ -108,23 +106,11 @@ std::vector<std::uint16_t> label_cells(const Overview& overview, const std::vect
 /// Least squares over the cells with either label, the normal on the first one's side.
 LocalPlane fit_both(const Overview& overview, const std::vector<std::uint16_t>& labels, std::size_t one, std::size_t other,
                     const LocalPlane& old) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  double count = 0;
+  std::vector<std::uint32_t> members;
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    if (labels[i] != one && labels[i] != other) continue;
-    mean += overview.cells.points[i].cast<double>();
-    ++count;
+    if (labels[i] == one || labels[i] == other) members.push_back(static_cast<std::uint32_t>(i));
   }
-  mean /= count;
-  for (std::size_t i = 0; i < labels.size(); ++i) {
-    if (labels[i] != one && labels[i] != other) continue;
-    const Eigen::Vector3d d = overview.cells.points[i].cast<double>() - mean;
-    spread += d * d.transpose();
-  }
-  Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
-  if (normal.dot(old.normal.cast<double>()) < 0) normal = -normal;
-  return {normal.cast<float>(), static_cast<float>(-normal.dot(mean))};
+  return fit_plane(overview.cells.points, members, old.normal.cast<double>()).plane();
 }
 
 /// What joins two planes, where they are alike: most cells of the smaller lie within tau, or the sensor's noise at their range, of the larger,

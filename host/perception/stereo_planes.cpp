@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
-
 namespace swarmfit::perception {
 namespace {
 
@@ -21,22 +19,6 @@ std::vector<std::uint32_t> known_members(const Overview& overview, std::span<con
   return members;
 }
 
-LocalPlane fit_plane(const Overview& overview, const std::vector<std::uint32_t>& members, const LocalPlane& old, const Eigen::Vector3d& up,
-                     double most_angle) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const auto i : members) mean += overview.cells.points[i].cast<double>();
-  mean /= static_cast<double>(members.size());
-  for (const auto i : members) {
-    const Eigen::Vector3d d = overview.cells.points[i].cast<double>() - mean;
-    spread += d * d.transpose();
-  }
-  Eigen::Vector3d normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
-  if (normal.dot(up) < 0) normal = -normal;
-  if (normal.dot(up) < std::cos(most_angle)) normal = old.normal.cast<double>();
-  return {normal.cast<float>(), static_cast<float>(-normal.dot(mean))};
-}
-
 }  // namespace
 
 LocalPlane refine_on_known(const Overview& overview, std::span<const std::uint32_t> chosen, const LocalPlane& plane, float tau,
@@ -45,7 +27,9 @@ LocalPlane refine_on_known(const Overview& overview, std::span<const std::uint32
   for (int round = 0; round < kRounds; ++round) {
     const auto members = known_members(overview, chosen, refined, tau);
     if (members.size() < kFewCells) break;
-    refined = fit_plane(overview, members, refined, up, most_angle);
+    PlaneFit fitted = fit_plane(overview.cells.points, members, up);
+    if (fitted.normal.dot(up) < std::cos(most_angle)) fitted.normal = refined.normal.cast<double>();
+    refined = fitted.plane();
   }
   return refined;
 }

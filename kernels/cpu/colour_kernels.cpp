@@ -79,22 +79,14 @@ const ColourKernels& colour_kernels() {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include "kernels/cpu/dispatch_table.hpp"
+
 namespace swarmfit::kernels::cpu {
 
 HWY_EXPORT(colour_kernels);
 
 const std::vector<const ColourKernels*>& available_colour_kernels() {
-  static const std::vector<const ColourKernels*> all = [] {
-    std::vector<const ColourKernels*> found;
-    constexpr std::size_t slots = sizeof HWY_DISPATCH_TABLE(colour_kernels) / sizeof HWY_DISPATCH_TABLE(colour_kernels)[0];
-    for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      // Highway's table: slot 0 dispatches, then the targets from the best down, the fallback last.
-      const auto mask = static_cast<std::uint64_t>(HWY_CHOSEN_TARGET_SHIFT(target) | HWY_CHOSEN_TARGET_MASK_SCALAR);
-      const std::size_t slot = slots == 1 ? 0 : hwy::Num0BitsBelowLS1Bit_Nonzero64(mask);
-      found.push_back(&HWY_DISPATCH_TABLE(colour_kernels)[slot]());
-    }
-    return found;
-  }();
+  static const std::vector<const ColourKernels*> all = runnable(HWY_DISPATCH_TABLE(colour_kernels));
   return all;
 }
 

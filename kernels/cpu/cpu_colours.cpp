@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "kernels/colour_costs.hpp"
 #include "kernels/cpu/colour_kernels.hpp"
@@ -37,12 +38,10 @@ std::vector<std::string> colour_cost_targets() {
 }
 
 Result<std::unique_ptr<ColourCosts>> make_cpu_colour_costs(std::string_view simd) {
-  std::string known;
   for (const cpu::ColourKernels* kernels : cpu::available_colour_kernels()) {
     if (simd.empty() || simd == kernels->name) return std::make_unique<CpuColourCosts>(*kernels);
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", kernels->name);
   }
-  return fail(Failure::Kind::unavailable, fmt::format("simd is '{}', must be one of: {}", simd, known));
+  return fail(Failure::Kind::unavailable, fmt::format("simd is '{}', must be one of: {}", simd, fmt::join(colour_cost_targets(), ", ")));
 }
 
 }  // namespace swarmfit::kernels

@@ -9,22 +9,14 @@
 #include "kernels/cpu/cpu_kernels-inl.hpp"
 
 #if HWY_ONCE
+#include "kernels/cpu/dispatch_table.hpp"
+
 namespace swarmfit::kernels::cpu {
 
 HWY_EXPORT(kernel_table);
 
 const std::vector<const CpuKernels*>& available_kernels() {
-  static const std::vector<const CpuKernels*> all = [] {
-    std::vector<const CpuKernels*> found;
-    constexpr std::size_t slots = sizeof HWY_DISPATCH_TABLE(kernel_table) / sizeof HWY_DISPATCH_TABLE(kernel_table)[0];
-    for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      // Highway's table: slot 0 dispatches, then the targets from the best down, the fallback last.
-      const auto mask = static_cast<std::uint64_t>(HWY_CHOSEN_TARGET_SHIFT(target) | HWY_CHOSEN_TARGET_MASK_SCALAR);
-      const std::size_t slot = slots == 1 ? 0 : hwy::Num0BitsBelowLS1Bit_Nonzero64(mask);
-      found.push_back(&HWY_DISPATCH_TABLE(kernel_table)[slot]());
-    }
-    return found;
-  }();
+  static const std::vector<const CpuKernels*> all = runnable(HWY_DISPATCH_TABLE(kernel_table));
   return all;
 }
 

@@ -108,17 +108,11 @@ void Cloud::write_bounds(Segment& segment) {
 
 void Cloud::write_caps(std::span<const float> values) {
   for (Segment& segment : segments_) {
-    write_values(segment, segment.caps, values);
+    const std::span<const float> caps = write_values(segment, segment.caps, values);
     if (!bounded_) continue;
-    segment.known.set_caps(gather(segment, values));
+    segment.known.set_caps(caps);
     write_bounds(segment);
   }
-}
-
-std::span<const float> Cloud::gather(const Segment& segment, std::span<const float> values) {
-  scratch_.resize(segment.count);
-  for (std::size_t i = 0; i < segment.count; ++i) scratch_[i] = values[row(segment.first + i)];
-  return scratch_;
 }
 
 void Cloud::write_tolerance(std::span<const float> values) {
@@ -128,11 +122,12 @@ void Cloud::write_tolerance(std::span<const float> values) {
   }
 }
 
-void Cloud::write_values(Segment& segment, Buffer& buffer, std::span<const float> values) {
-  write(buffer, segment.stride, [&](std::span<float> out) {
-    for (std::size_t i = 0; i < segment.count; ++i) out[i] = values[row(segment.first + i)];
-    std::fill(out.begin() + segment.count, out.end(), 0.0F);
-  });
+std::span<const float> Cloud::write_values(Segment& segment, Buffer& buffer, std::span<const float> values) {
+  scratch_.resize(segment.count);
+  for (std::size_t i = 0; i < segment.count; ++i) scratch_[i] = values[row(segment.first + i)];
+  write(buffer, segment.stride,
+        [&](std::span<float> out) { std::fill(std::copy(scratch_.begin(), scratch_.end(), out.begin()), out.end(), 0.0F); });
+  return scratch_;
 }
 
 template <class Fill>

@@ -52,13 +52,12 @@ class Cloud {
  private:
   template <class Fill>
   void write(Buffer& buffer, std::size_t floats, Fill&& fill);
-  void write_values(Segment& segment, Buffer& buffer, std::span<const float> values);
+  /// Returns what was written, in the segment's order and without padding; until the next call.
+  std::span<const float> write_values(Segment& segment, Buffer& buffer, std::span<const float> values);
   void write_columns(Segment& segment);
   void write_bounds(Segment& segment);
   void read_columns(const PointsView& points);
   void sort();
-  /// `values` in the segment's order, without padding.
-  std::span<const float> gather(const Segment& segment, std::span<const float> values);
 
   const Device& device_;
   bool sorted_, bounded_ = false;

@@ -118,8 +118,22 @@ void Commands::bind_set(vk::DescriptorSet set, const Segment& segment, const Buf
       vk::WriteDescriptorSet(set, layout::kBindPointTexels, 0, vk::DescriptorType::eUniformTexelBuffer, {}, {}, views), {});
 }
 
-vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const TileShape& shape) const {
+/// A dispatch over each segment's cost set, of as many groups along x and y as groups(segment) says.
+template <class Groups>
+void Commands::record_each(const vk::raii::CommandBuffer& commands, vk::Pipeline pipeline, std::uint32_t models, Groups&& groups) const {
   const vk::PipelineLayout layout = pipelines_.layout();
+  commands.bindPipeline(vk::PipelineBindPoint::eCompute, pipeline);
+  for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
+    const Segment& segment = cloud_->segments()[s];
+    const layout::Push push{segment.stride, segment.sums, models, 0, segment.known.stride()};
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
+    commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
+    const auto [x, y] = groups(segment);
+    commands.dispatch(x, y, 1);
+  }
+}
+
+vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const TileShape& shape) const {
   const auto dimension = static_cast<std::uint32_t>(dimension_);
   const ChunkShape& chunk = cloud_->shape();
   const vk::Pipeline cost = pipelines_.get(
@@ -128,27 +142,15 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
 
   vk::raii::CommandBuffer commands = device_.allocate_commands();
   commands.begin(vk::CommandBufferBeginInfo());
-  const auto each_segment = [&](std::uint32_t x, std::uint32_t y) {
-    for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
-      const Segment& segment = cloud_->segments()[s];
-      const layout::Push push{segment.stride, segment.sums, 0, 0, 0};
-      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
-      commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
-      commands.dispatch(x > 0 ? x : segment.chunks, y, 1);
-    }
-  };
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, cost);
-  each_segment(0, shape.tiles);
+  record_each(commands, cost, 0, [&](const Segment& segment) { return Grid(segment.chunks, shape.tiles); });
   wait_for(commands, Access::eShaderRead, Stage::eComputeShader);
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, reduce);
-  each_segment(shape.padded(), 1);
+  record_each(commands, reduce, 0, [&](const Segment&) { return Grid(shape.padded(), 1); });
   wait_for(commands, Access::eHostRead, Stage::eHost);
   commands.end();
   return commands;
 }
 
 vk::raii::CommandBuffer Commands::record_pruned(ModelKind kind, Loss loss, const TileShape& shape, std::size_t models) const {
-  const vk::PipelineLayout layout = pipelines_.layout();
   const ChunkShape& chunk = cloud_->shape();
   Specialisation wanted{.shader = Shader::bound,
                         .group = reduce_group(device_.traits()),
@@ -167,23 +169,11 @@ vk::raii::CommandBuffer Commands::record_pruned(ModelKind kind, Loss loss, const
   vk::raii::CommandBuffer commands = device_.allocate_commands();
   commands.begin(vk::CommandBufferBeginInfo());
   const auto count = static_cast<std::uint32_t>(models);
-  const auto each_segment = [&](vk::Pipeline pipeline, auto&& groups) {
-    commands.bindPipeline(vk::PipelineBindPoint::eCompute, pipeline);
-    for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
-      const Segment& segment = cloud_->segments()[s];
-      const layout::Push push{segment.stride, segment.sums, count, 0, segment.known.stride()};
-      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
-      commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
-      const auto [x, y] = groups(segment);
-      commands.dispatch(x, y, 1);
-    }
-  };
-  using Grid = std::pair<std::uint32_t, std::uint32_t>;
-  each_segment(bound, [&](const Segment&) { return Grid(count, 1); });
+  record_each(commands, bound, count, [&](const Segment&) { return Grid(count, 1); });
   wait_for(commands, Access::eShaderRead | Access::eShaderWrite, Stage::eComputeShader);
-  each_segment(cost, [&](const Segment& segment) { return Grid(segment.chunks, (count + kSpan - 1) / kSpan); });
+  record_each(commands, cost, count, [&](const Segment& segment) { return Grid(segment.chunks, (count + kSpan - 1) / kSpan); });
   wait_for(commands, Access::eShaderRead, Stage::eComputeShader);
-  each_segment(reduce, [&](const Segment&) { return Grid(count, 1); });
+  record_each(commands, reduce, count, [&](const Segment&) { return Grid(count, 1); });
   wait_for(commands, Access::eHostRead, Stage::eHost);
   commands.end();
   return commands;

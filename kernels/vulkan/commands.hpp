@@ -3,6 +3,7 @@
 
 #include <map>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "kernels/vulkan/cloud.hpp"
@@ -47,6 +48,9 @@ class Commands {
   void bind_costs();
   void bind_map(bool own_tolerance);
   void bind_set(vk::DescriptorSet set, const Segment& segment, const Buffer& caps, const Buffer& out) const;
+  using Grid = std::pair<std::uint32_t, std::uint32_t>;  // groups along x and y
+  template <class Groups>
+  void record_each(const vk::raii::CommandBuffer& commands, vk::Pipeline pipeline, std::uint32_t models, Groups&& groups) const;
   vk::raii::CommandBuffer record_costs(ModelKind kind, Loss loss, const TileShape& shape) const;
   vk::raii::CommandBuffer record_pruned(ModelKind kind, Loss loss, const TileShape& shape, std::size_t models) const;
   /// Runs what is recorded under this, or what `record` records, and adds up the segments' costs.

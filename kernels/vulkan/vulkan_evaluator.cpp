@@ -67,6 +67,7 @@ class VulkanEvaluator final : public FitnessEvaluator {
   Identity identity_;
   std::shared_ptr<const OwnModel> own_;
   PruningPause pruning_;
+  std::vector<char> finite_;  // a model of the swarm: whether its coefficients are finite
   int dimension_ = 0;
   Effort effort_;
 };
@@ -139,9 +140,10 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
   const bool worth = model.bounded && !(device_.traits().software && model.affine);
   const bool pruned = cloud_.bounded() && worth && pruning_.now();
   const std::span<float> rows = commands_.coefficients(swarm.count);
+  finite_.resize(swarm.count);
   for (std::size_t j = 0; j < swarm.count; ++j) {
     const std::span<float> row = rows.subspan(j * layout::kCoefficientStride, layout::kCoefficientStride);
-    write_model(swarm.kind, swarm.parameters.data() + j * width, row);
+    finite_[j] = write_model(swarm.kind, swarm.parameters.data() + j * width, row);
     if (pruned) write_for_pruning(swarm.kind, cutoffs.empty() ? std::numeric_limits<float>::infinity() : cutoffs[j], row);
   }
   const std::uint64_t all = std::uint64_t{swarm.count} * cloud_.extent().finite_count;
@@ -156,10 +158,7 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
     effort_.touched += all;
   }
   for (std::size_t j = 0; j < swarm.count; ++j) {
-    double k[kMaxCoefficients];
-    if (!centred(swarm.kind, swarm.parameters.data() + j * width, k)) {
-      costs[j] = std::numeric_limits<float>::infinity();
-    }
+    if (!finite_[j]) costs[j] = std::numeric_limits<float>::infinity();
   }
 }
 
