@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 namespace swarmfit::kernels {
@@ -17,6 +18,8 @@ struct PointsView {
   std::size_t count = 0;   ///< rows
   std::size_t stride = 0;  ///< bytes from a row to the next
   bool ordered = false;    ///< neighbours in the list are neighbours in space, as in Morton order: nobody needs to sort them
+  /// Where known, whether a row is finite: bit i % 64 of word i / 64, as Survey has it. Passes then leave the holes of an image out.
+  const std::uint64_t* finite_rows = nullptr;
 
   double at(std::size_t row, int column) const noexcept {
     const char* p = static_cast<const char*>(data) + row * stride;

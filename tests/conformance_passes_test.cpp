@@ -178,6 +178,61 @@ TEST_P(Passes, ClaimsAgreeWithTheLabelsAndTheOracle) {
   }
 }
 
+// An image has holes of whole words; who knows of them may leave them out and must come to the same bytes.
+TEST_P(Passes, HolesThatAreKnownChangeNothing) {
+  for (const std::size_t points : kSizes) {
+    for (const bool wide : {false, true}) {
+      SCOPED_TRACE(std::to_string(points) + (wide ? " points, double" : " points, float"));
+      Cloud cloud = make_cloud(ModelKind::plane, points);
+      for (std::size_t i = 0; i < points; ++i) {
+        const std::size_t word = i / 64;
+        const bool hole = word % 3 == 1 || word % 11 < 4 || i % 97 == 5 || (points > 40000 && word / 16 == 9);
+        if (hole) cloud.narrow[3 * i + i % 3] = i % 2 == 0 ? kNaN : kInf;
+      }
+      const std::vector<double> rows(cloud.narrow.begin(), cloud.narrow.end());
+      const PointsView blind = wide ? PointsView{rows.data(), Scalar::float64, 3, points, 3 * sizeof(double)} : cloud.view();
+      Survey survey;
+      ASSERT_OK(evaluator().survey(blind, survey));
+      PointsView knowing = blind;
+      knowing.finite_rows = survey.finite.data();
+      std::vector<double> swarm = make_swarm(ModelKind::plane, 3);
+      swarm.insert(swarm.end(), {0, 0, std::numeric_limits<double>::quiet_NaN(), 0});
+      const std::vector<ModelView> models = views(ModelKind::plane, swarm);
+      const auto same = [&](const std::vector<Evidence>& a, const std::vector<Evidence>& b) {
+        for (std::size_t m = 0; m < models.size(); ++m) {
+          EXPECT_EQ(a[m].count, b[m].count);
+          EXPECT_EQ(a[m].cost, b[m].cost);
+          EXPECT_EQ(a[m].square, b[m].square);
+          EXPECT_EQ(a[m].moments.mean, b[m].moments.mean);
+          EXPECT_EQ(a[m].moments.scatter, b[m].moments.scatter);
+        }
+      };
+      std::vector<Evidence> of_blind(models.size()), of_knowing(models.size());
+      std::vector<std::uint16_t> labels(points, 7);
+      Guarded<std::uint16_t> found(points, 999);
+      ASSERT_OK(evaluator().claim(blind, 0.03F, models, labels, of_blind));
+      ASSERT_OK(evaluator().claim(knowing, 0.03F, models, found.span(), of_knowing));
+      EXPECT_TRUE(found.intact()) << "written outside labels";
+      EXPECT_TRUE(std::equal(labels.begin(), labels.end(), found.span().begin()));
+      same(of_blind, of_knowing);
+      for (const std::span<const float> caps : {std::span<const float>(), std::span<const float>(cloud.caps)}) {
+        std::vector<float> distances(points * models.size());
+        Guarded<float> told(points * models.size(), -1.0F);
+        ASSERT_OK(evaluator().weigh(blind, {0.02F, 0.1F, caps}, models, distances, of_blind));
+        ASSERT_OK(evaluator().weigh(knowing, {0.02F, 0.1F, caps}, models, told.span(), of_knowing));
+        EXPECT_TRUE(told.intact()) << "written outside distances";
+        for (std::size_t i = 0; i < distances.size(); ++i) {
+          ASSERT_TRUE(told.span()[i] == distances[i] || (std::isnan(told.span()[i]) && std::isnan(distances[i]))) << i;
+        }
+        same(of_blind, of_knowing);
+      }
+      Survey again;
+      ASSERT_OK(evaluator().survey(knowing, again));
+      EXPECT_EQ(again.finite, survey.finite);
+    }
+  }
+}
+
 TEST_P(Passes, NoPointsAndNoModels) {
   Survey survey;
   ASSERT_OK(evaluator().survey({nullptr, Scalar::float32, 3, 0, 12}, survey));

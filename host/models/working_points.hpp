@@ -59,7 +59,12 @@ class WorkingPoints {
   const Frame& frame() const noexcept { return frame_; }
   /// Dimension of the smallest flat that holds all finite points (to float precision): 0 a point, 1 a line, 2 a plane ...
   int rank() const noexcept { return rank_; }
-  const kernels::PointsView& view() const noexcept { return view_; }
+  /// Tells which rows are finite, out of this cloud's own memory.
+  kernels::PointsView view() const noexcept {
+    kernels::PointsView view = view_;
+    view.finite_rows = survey_.finite.data();
+    return view;
+  }
   double at(std::size_t i, int d) const noexcept { return (view_.at(i, d) - frame_.centre[static_cast<std::size_t>(d)]) / frame_.scale; }
   template <int D>
   Eigen::Matrix<double, D, 1> point(std::size_t i) const noexcept {

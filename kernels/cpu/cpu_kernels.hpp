@@ -75,7 +75,7 @@ inline constexpr std::size_t kStripPoints = 512;
 struct Strip {
   alignas(64) std::array<std::array<float, kStripPoints>, kMaxDimension> columns;
   alignas(64) std::array<float, kStripPoints> limit;
-  std::size_t count = 0;  ///< rows of the caller
+  std::size_t count = 0;  ///< rows of the caller that are in it
 };
 
 /// Sums over a strip, about its pivot.
@@ -112,10 +112,10 @@ struct CpuKernels {
   void (*keep_nearest)(const float* distances, const float* tolerance, std::size_t count, std::uint16_t label, float* nearest,
                        std::uint16_t* labels);
 
-  /// Fills a strip from `count` tight rows of `dimension` columns, less the pivot. Those that are finite get `limit`, or their cap where
-  /// `caps` is not null, and a bit in `finite`, of which a whole strip's words are written.
+  /// Fills a strip from place `at` on, a multiple of 64, which is then its end, from `count` tight rows of `dimension` columns, less the
+  /// pivot. Those that are finite get `limit`, or their cap where `caps` is not null, and a bit in the words of `finite`.
   void (*split)(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, const float* caps,
-                Strip& strip, std::uint64_t* finite);
+                std::size_t at, Strip& strip, std::uint64_t* finite);
 
   /// Of all finite points, each with weight 1; in double, so that the moments tell a plane from a line.
   void (*sum_all)(const Strip& strip, std::size_t dimension, StripSums& sums);

@@ -62,22 +62,47 @@ void fetch_probes(const PointsView& points, std::size_t first) {
   }
 }
 
+constexpr std::size_t kWordBits = 64, kStripWords = kStripPoints / kWordBits;
+
+/// Rows of a strip that follow each other and are in it.
+struct Piece {
+  std::size_t row, at, count;  ///< first row and its place, counted from the strip's first
+};
+
 /// What a task needs to work on one strip after another.
 struct Bench {
   Strip strip;
   Pivot pivot;
-  std::array<std::uint64_t, kStripPoints / 64> finite;
+  std::array<std::uint64_t, kStripWords> finite;
   std::array<float, kStripPoints * kMaxDimension> rows;
   std::size_t first = 0, count = 0;
+  std::array<Piece, kStripWords> pieces;
+  std::size_t piece_count = 0;
   std::vector<std::size_t> claimants;  ///< models that some point was given to
 
   /// Strip number `index` of the points; those that are finite get `limit`, or their cap where there are any. False if none is finite.
+  /// Words without a finite row are left out where the points tell of them.
   bool load(const CpuKernels& kernels, const PointsView& points, std::size_t index, float limit, std::span<const float> caps = {}) {
     first = index * kStripPoints;
     count = std::min(kStripPoints, points.count - first);
+    cut(points);
     if (!caps.empty()) caps = caps.subspan(first, count);
     fetch_probes(points, first + kStripPoints);
+    if (piece_count == 0) return false;
     return points.scalar == Scalar::float32 ? load_as<float>(kernels, points, limit, caps) : load_as<double>(kernels, points, limit, caps);
+  }
+
+  /// What was found for the strip's rows to where the caller has a place for each of his; `nothing` for those that are not in it.
+  template <class T, class Give>
+  void hand_back(T nothing, std::span<T> all, Give&& give) const {
+    T* const to = all.data() + first;
+    std::size_t row = 0;
+    for (const Piece& piece : std::span(pieces).first(piece_count)) {
+      std::fill(to + row, to + piece.row, nothing);
+      give(piece.at, piece.count, to + piece.row);
+      row = piece.row + piece.count;
+    }
+    std::fill(to + row, to + count, nothing);
   }
 
   /// The sums' moments in the points' frame.
@@ -105,7 +130,7 @@ struct Bench {
   /// For a model that cannot be evaluated: every distance is infinite. Returns its cost.
   double be_nowhere(std::array<float, kStripPoints>& distances) const {
     double cost = 0;
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < strip.count; ++i) {
       const bool there = strip.limit[i] >= 0;
       distances[i] = there ? std::numeric_limits<float>::infinity() : std::numeric_limits<float>::quiet_NaN();
       cost += there ? static_cast<double>(strip.limit[i]) : 0.0;
@@ -122,46 +147,85 @@ struct Bench {
   }
 
  private:
+  /// The rows to be in the strip: all, or the words of them that hold a finite one.
+  void cut(const PointsView& points) {
+    strip.count = 0;
+    pivot = {};
+    piece_count = 0;
+    if (points.finite_rows == nullptr) {
+      pieces[piece_count++] = {0, 0, count};
+      return;
+    }
+    const std::uint64_t* const words = points.finite_rows + first / kWordBits;
+    std::size_t at = 0;
+    for (std::size_t row = 0; row < count; row += kWordBits) {
+      if (words[row / kWordBits] == 0) continue;
+      const std::size_t here = std::min(kWordBits, count - row);
+      if (piece_count > 0 && pieces[piece_count - 1].row + pieces[piece_count - 1].count == row) {
+        pieces[piece_count - 1].count += here;
+      } else {
+        pieces[piece_count++] = {row, at, here};
+      }
+      at += here;
+    }
+  }
+
   template <class S>
   bool load_as(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
     const bool chosen = choose_pivot<S>(points, first, count, pivot);
     split<S>(kernels, points, limit, caps);
-    const auto word = std::find_if(finite.begin(), finite.end(), [](std::uint64_t bits) { return bits != 0; });
-    if (word == finite.end()) return false;
+    const auto word = std::find_if(finite.begin(), finite.begin() + static_cast<std::ptrdiff_t>((strip.count + kWordBits - 1) / kWordBits),
+                                   [](std::uint64_t bits) { return bits != 0; });
+    const std::size_t place = static_cast<std::size_t>(word - finite.begin()) * kWordBits;
+    if (place >= strip.count) return false;
     if (!chosen) {
-      read_row<S>(points, first + static_cast<std::size_t>(word - finite.begin()) * 64 + static_cast<std::size_t>(std::countr_zero(*word)),
-                  pivot);
+      read_row<S>(points, first + row_at(place) + static_cast<std::size_t>(std::countr_zero(*word)), pivot);
       split<S>(kernels, points, limit, caps);
     }
     return true;
   }
 
+  std::size_t row_at(std::size_t place) const {
+    std::size_t k = 0;
+    while (place >= pieces[k].at + pieces[k].count) ++k;
+    return pieces[k].row + place - pieces[k].at;
+  }
+
   template <class S>
   void split(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
-    const auto width = static_cast<std::size_t>(points.dimension);
-    const char* from = static_cast<const char*>(points.data) + first * points.stride;
     std::array<float, kMaxDimension> origin{};
-    const float* tight = rows.data();
-    if constexpr (std::is_same_v<S, float>) {
-      for (std::size_t d = 0; d < width; ++d) origin[d] = static_cast<float>(pivot[d]);
-      if (points.stride == width * sizeof(float) && reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0) {
-        tight = reinterpret_cast<const float*>(from);
-      } else {
-        for (std::size_t i = 0; i < count; ++i, from += points.stride) std::memcpy(rows.data() + i * width, from, width * sizeof(float));
-      }
-    } else {
-      if (width == 2) narrow_rows<2>(from, points.stride);
-      if (width == 3) narrow_rows<3>(from, points.stride);
-      if (width == 4) narrow_rows<4>(from, points.stride);
+    for (std::size_t d = 0; d < static_cast<std::size_t>(points.dimension); ++d) origin[d] = static_cast<float>(pivot[d]);
+    if constexpr (!std::is_same_v<S, float>) origin = {};  // taken off while rows are narrowed
+    for (const Piece& piece : std::span(pieces).first(piece_count)) {
+      kernels.split(tight_rows<S>(points, piece), static_cast<std::size_t>(points.dimension), piece.count, origin.data(), limit,
+                    caps.empty() ? nullptr : caps.data() + piece.row, piece.at, strip, finite.data() + piece.at / kWordBits);
     }
-    kernels.split(tight, width, count, origin.data(), limit, caps.empty() ? nullptr : caps.data(), strip, finite.data());
+  }
+
+  /// The caller's own memory where rows lie there one beside the other, else a copy.
+  template <class S>
+  const float* tight_rows(const PointsView& points, const Piece& piece) {
+    const auto width = static_cast<std::size_t>(points.dimension);
+    const char* from = static_cast<const char*>(points.data) + (first + piece.row) * points.stride;
+    if constexpr (std::is_same_v<S, float>) {
+      if (points.stride == width * sizeof(float) && reinterpret_cast<std::uintptr_t>(from) % alignof(float) == 0) {
+        return reinterpret_cast<const float*>(from);
+      }
+      for (std::size_t i = 0; i < piece.count; ++i, from += points.stride)
+        std::memcpy(rows.data() + i * width, from, width * sizeof(float));
+    } else {
+      if (width == 2) narrow_rows<2>(from, points.stride, piece.count);
+      if (width == 3) narrow_rows<3>(from, points.stride, piece.count);
+      if (width == 4) narrow_rows<4>(from, points.stride, piece.count);
+    }
+    return rows.data();
   }
 
   /// Doubles about the pivot as floats: finite stays finite, anything else becomes NaN.
   template <std::size_t Width>
-  void narrow_rows(const char* from, std::size_t stride) {
+  void narrow_rows(const char* from, std::size_t stride, std::size_t number) {
     constexpr double kMost = std::numeric_limits<float>::max();
-    for (std::size_t i = 0; i < count; ++i, from += stride) {
+    for (std::size_t i = 0; i < number; ++i, from += stride) {
       double row[Width];
       std::memcpy(row, from, sizeof row);
       for (std::size_t d = 0; d < Width; ++d) {
@@ -186,16 +250,17 @@ void for_strips(const PointsView& points, Body&& body) {
 }  // namespace
 
 void PointPasses::survey(const PointsView& points, Survey& survey) {
-  constexpr std::size_t kWords = kStripPoints / 64;
   survey.finite.resize((points.count + 63) / 64);
   evidence_.assign(run_count(points), {});
-  for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    if (bench.load(kernels_, points, strip, 0)) {
+  PointsView unknown = points;
+  unknown.finite_rows = nullptr;
+  for_strips(unknown, [&](Bench& bench, std::size_t run, std::size_t strip) {
+    if (bench.load(kernels_, unknown, strip, 0)) {
       StripSums sums;
       kernels_.sum_all(bench.strip, static_cast<std::size_t>(points.dimension), sums);
       bench.add(sums, evidence_[run]);
     }
-    std::copy_n(bench.finite.begin(), (bench.count + 63) / 64, survey.finite.begin() + static_cast<std::ptrdiff_t>(strip * kWords));
+    std::copy_n(bench.finite.begin(), (bench.count + 63) / 64, survey.finite.begin() + static_cast<std::ptrdiff_t>(strip * kStripWords));
   });
   std::array<Evidence, 1> all;
   add_up(evidence_.size(), all);
@@ -221,8 +286,10 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
         sums.cost = bench.be_nowhere(told);
       }
       bench.add(sums, evidence_[run * models.size() + m]);
-      if (!distances.empty())
-        std::copy_n(told.begin(), bench.count, distances.begin() + static_cast<std::ptrdiff_t>(m * points.count + bench.first));
+      if (!distances.empty()) {
+        bench.hand_back(std::numeric_limits<float>::quiet_NaN(), distances.subspan(m * points.count, points.count),
+                        [&](std::size_t at, std::size_t count, float* to) { std::copy_n(told.data() + at, count, to); });
+      }
     }
   });
   add_up(runs, evidence);
@@ -254,7 +321,8 @@ void PointPasses::claim(const PointsView& points, float tolerance, std::span<con
                                           nearest.data(), label.data(), of_run[m].cost);
       if (claimed) bench.claimants.push_back(m);
     }
-    kernels_.end_claim(label.data(), bench.count, labels.data() + bench.first);
+    bench.hand_back(std::uint16_t{0}, labels,
+                    [&](std::size_t at, std::size_t count, std::uint16_t* to) { kernels_.end_claim(label.data() + at, count, to); });
     for (const std::size_t m : bench.claimants) {
       StripSums sums;
       kernels_.sum_labelled(bench.strip, width, static_cast<std::int32_t>(m + 1), nearest.data(), label.data(), sums);

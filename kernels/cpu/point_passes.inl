@@ -43,11 +43,11 @@ HWY_INLINE void load_rows(const float* HWY_RESTRICT rows, Vector* x) {
 
 template <std::size_t D>
 HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, const float* HWY_RESTRICT pivot, float limit,
-                         const float* HWY_RESTRICT caps, Strip& strip, std::uint64_t* HWY_RESTRICT finite) {
+                         const float* HWY_RESTRICT caps, std::size_t at, Strip& strip, std::uint64_t* HWY_RESTRICT finite) {
   constexpr float kFar = 1e18F;  // its square is still a float
   const FloatTag d;
   const Vector zero = hn::Zero(d);
-  std::fill(finite, finite + kStripPoints / 64, std::uint64_t{0});
+  std::fill(finite, finite + (count + 63) / 64, std::uint64_t{0});
   const auto put = [&](std::size_t i, const float* from, Vector allowed) HWY_ATTR {
     Vector x[D];
     load_rows<D>(from, x);
@@ -56,9 +56,9 @@ HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, cons
     const auto usable = hn::Eq(probe, zero);
     for (std::size_t c = 0; c < D; ++c) {
       const Vector centred = hn::Clamp(hn::Sub(x[c], hn::Set(d, pivot[c])), hn::Set(d, -kFar), hn::Set(d, kFar));
-      hn::Store(hn::IfThenElseZero(usable, centred), d, strip.columns[c].data() + i);
+      hn::Store(hn::IfThenElseZero(usable, centred), d, strip.columns[c].data() + at + i);
     }
-    hn::Store(hn::IfThenElse(usable, allowed, hn::Set(d, -1.0F)), d, strip.limit.data() + i);
+    hn::Store(hn::IfThenElse(usable, allowed, hn::Set(d, -1.0F)), d, strip.limit.data() + at + i);
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, usable, bits);
     finite[i / 64] |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << (i % 64);
@@ -73,7 +73,7 @@ HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, cons
     if (i < count && caps != nullptr) std::copy(caps + i, caps + count, last_caps);
     put(i, last, caps != nullptr ? hn::Load(d, last_caps) : same);
   }
-  strip.count = count;
+  strip.count = at + count;
 }
 
 /// body.template operator()<D>() for the dimension.
@@ -84,9 +84,9 @@ HWY_INLINE void with_dimension(std::size_t dimension, Body&& body) {
   body.template operator()<4>();
 }
 
-void split(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, const float* caps, Strip& strip,
-           std::uint64_t* finite) {
-  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { split_of<D>(rows, count, pivot, limit, caps, strip, finite); });
+void split(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, const float* caps, std::size_t at,
+           Strip& strip, std::uint64_t* finite) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { split_of<D>(rows, count, pivot, limit, caps, at, strip, finite); });
 }
 
 template <std::size_t D>
