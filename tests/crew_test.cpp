@@ -6,6 +6,7 @@
 #include <new>
 #include <numeric>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -55,17 +56,20 @@ TEST_P(CrewOf, GivesEachMemberToOneThread) {
     // Were two threads the same member at a time, some of what they count would be lost.
     std::vector<std::size_t> counts(members);
     std::atomic<bool> beyond = false;
-    run_in(crew, true, [&] {
-      for_each_task_as_member(2000, [&](std::size_t, std::size_t member) {
-        if (member >= members) {
-          beyond = true;
-        } else {
-          ++counts[member];
-        }
-      });
-    });
+    std::atomic<std::size_t> handed_in = 0;
+    const auto count = [&](std::size_t, std::size_t member) {
+      if (member >= members) {
+        beyond = true;
+      } else {
+        ++counts[member];
+      }
+    };
+    // What a member has gathered is handed in by itself, when it has done its last task.
+    run_in(crew, true,
+           [&] { for_each_task_as_member(2000, count, [&](std::size_t member) { handed_in += std::exchange(counts[member], 0); }); });
     ASSERT_FALSE(beyond);
-    ASSERT_EQ(std::accumulate(counts.begin(), counts.end(), std::size_t{0}), 2000U);
+    ASSERT_EQ(handed_in, 2000U);
+    ASSERT_EQ(std::accumulate(counts.begin(), counts.end(), std::size_t{0}), 0U);
     if (again % 50 == 49) std::this_thread::sleep_for(std::chrono::milliseconds(3));  // helpers go, and others come
   }
 }

@@ -129,37 +129,39 @@ HWY_INLINE void block_sums(const TileView& tile, std::size_t first, const Vector
   for (int p = 0; p < P; ++p) total[p] = total_of(sum[p]);
 }
 
-/// Of numbers that an int holds.
-HWY_INLINE hn::Vec<BitsTag> nearest_int(Vector value) {
-#if HWY_TARGET <= HWY_AVX3
-  return hn::Vec<BitsTag>{_mm512_cvtps_epi32(value.raw)};  // Highway's minds what overflows as well
-#else
-  return hn::NearestInt(value);
-#endif
-}
-
 /// Whole quanta: exact however they are added up.
 struct QuantumSums {
   using Lane = std::int32_t;
-  static HWY_INLINE void add(Vector lane_sums, Vector scale, Lane* HWY_RESTRICT to) {
+  static constexpr std::size_t kLanes = kMaxLanes;  ///< numbers that a model has room for
+#if HWY_TARGET <= HWY_AVX3
+  // A sum of at most 2^23 quanta added to 2^23 of them is rounded to a whole number of them, which its lowest bits then are; as good as a
+  // product and a conversion, and the units that multiply are what everything waits for.
+  static constexpr float kWhole = 0x1p23F;
+  static_assert(std::size_t{1} << 27 <= (std::size_t{1} << 23) * lanes());
+  Vector whole;
+  explicit HWY_INLINE QuantumSums(float scale) : whole(hn::Set(FloatTag(), kWhole / scale)) {}
+  HWY_INLINE hn::Vec<BitsTag> rounded(Vector lane_sums) const {
     const BitsTag d;
-    hn::Store(hn::Add(hn::Load(d, to), nearest_int(hn::Mul(lane_sums, scale))), d, to);
+    return hn::Sub(hn::BitCast(d, hn::Add(lane_sums, whole)), hn::BitCast(d, whole));
   }
-  static HWY_INLINE void finish(const Lane* from, PartialCost& cost) {
+#else
+  Vector scale;
+  explicit HWY_INLINE QuantumSums(float quanta) : scale(hn::Set(FloatTag(), quanta)) {}
+  HWY_INLINE hn::Vec<BitsTag> rounded(Vector lane_sums) const { return hn::NearestInt(hn::Mul(lane_sums, scale)); }
+#endif
+  HWY_INLINE void add(Vector lane_sums, Lane* HWY_RESTRICT to) const {
     const BitsTag d;
-    cost.units += hn::GetLane(hn::SumOfLanes(d, hn::Load(d, from)));  // of a tile: no more than an int holds
+    hn::Store(hn::Add(hn::Load(d, to), rounded(lane_sums)), d, to);
   }
 };
 
 /// Floating point, block after block.
 struct FloatSums {
   using Lane = float;
-  static HWY_INLINE void add(Vector lane_sums, Vector, Lane* HWY_RESTRICT to) {
+  static constexpr std::size_t kLanes = lanes();
+  HWY_INLINE void add(Vector lane_sums, Lane* HWY_RESTRICT to) const {
     const FloatTag d;
     hn::Store(hn::Add(hn::Load(d, to), lane_sums), d, to);
-  }
-  static HWY_INLINE void finish(const Lane* from, PartialCost& cost) {
-    for (std::size_t lane = 0; lane < lanes(); ++lane) cost.value += static_cast<double>(from[lane]);
   }
 };
 
@@ -171,7 +173,7 @@ struct BlockRun {
 
 /// `P` models over a run of blocks.
 template <class Model, Loss loss, class Sums, int P>
-HWY_INLINE void add_run(const TileView& tile, BlockRun run, Vector scale, const float* const* coefficients,
+HWY_INLINE void add_run(const TileView& tile, BlockRun run, const Sums& form, const float* const* coefficients,
                         typename Sums::Lane* const* sums) {
   constexpr std::size_t C = Model::traits.coefficient_count;
   Vector k[P][C];
@@ -181,7 +183,7 @@ HWY_INLINE void add_run(const TileView& tile, BlockRun run, Vector scale, const 
   for (std::size_t block = run.first; block < run.last; ++block) {
     Vector total[P];
     block_sums<Model, loss, P, C>(tile, block * kBlockPoints, k, total);
-    for (int p = 0; p < P; ++p) Sums::add(total[p], scale, sums[p]);
+    for (int p = 0; p < P; ++p) form.add(total[p], sums[p]);
   }
 }
 
@@ -197,20 +199,20 @@ HWY_INLINE void fetch(const TileView& tile, std::size_t first, std::size_t count
 
 /// A run of blocks and the listed models, as many at once as the registers hold.
 template <class Model, Loss loss, class Sums>
-HWY_INLINE void add_listed(const TileView& tile, BlockRun run, Vector scale, const float* const* coefficients,
+HWY_INLINE void add_listed(const TileView& tile, BlockRun run, const Sums& form, const float* const* coefficients,
                            typename Sums::Lane* const* sums, std::size_t models) {
   constexpr std::size_t P = models_at_once<Model>();
   std::size_t j = 0;
-  for (; j + P <= models; j += P) add_run<Model, loss, Sums, P>(tile, run, scale, coefficients + j, sums + j);
+  for (; j + P <= models; j += P) add_run<Model, loss, Sums, P>(tile, run, form, coefficients + j, sums + j);
   if constexpr (P > 2) {
-    for (; j + 2 <= models; j += 2) add_run<Model, loss, Sums, 2>(tile, run, scale, coefficients + j, sums + j);
+    for (; j + 2 <= models; j += 2) add_run<Model, loss, Sums, 2>(tile, run, form, coefficients + j, sums + j);
   }
-  for (; j < models; ++j) add_run<Model, loss, Sums, 1>(tile, run, scale, coefficients + j, sums + j);
+  for (; j < models; ++j) add_run<Model, loss, Sums, 1>(tile, run, form, coefficients + j, sums + j);
 }
 
 /// All models over the tile, run by run; while they pass over one, the next is fetched, a share for each few models.
 template <class Model, Loss loss, class Sums>
-HWY_INLINE void add_all(const TileView& tile, Vector scale, const float* const* coefficients, typename Sums::Lane* const* sums,
+HWY_INLINE void add_all(const TileView& tile, const Sums& form, const float* const* coefficients, typename Sums::Lane* const* sums,
                         std::size_t models) {
   constexpr std::size_t kFew = 2 * models_at_once<Model>();
   for (std::size_t first = 0; first < tile.blocks; first += kRunBlocks) {
@@ -219,68 +221,73 @@ HWY_INLINE void add_all(const TileView& tile, Vector scale, const float* const* 
     std::size_t ahead = run.last * kBlockPoints;
     for (std::size_t j = 0; j < models; j += kFew, ahead += share) {
       fetch<Model>(tile, ahead, share);
-      add_listed<Model, loss, Sums>(tile, run, scale, coefficients + j, sums + j, std::min(kFew, models - j));
+      add_listed<Model, loss, Sums>(tile, run, form, coefficients + j, sums + j, std::min(kFew, models - j));
     }
   }
 }
 
-/// `blocks`: null for all, else a bit a block for each model.
+/// `blocks`: null for all, else a bit a block for each model. `sums`: Sums::kLanes numbers a model, an aligned vector at their start.
 template <class Model, Loss loss, class Sums>
-HWY_INLINE void add_costs_of(const TileView& tile, float scale, const float* HWY_RESTRICT coefficients, std::size_t models,
-                             const std::uint8_t* blocks, PartialCost* HWY_RESTRICT costs) {
-  using Lane = typename Sums::Lane;
+HWY_INLINE void add_lanes(const TileView& tile, const Sums& form, const float* HWY_RESTRICT coefficients, std::size_t models,
+                          const std::uint8_t* blocks, typename Sums::Lane* HWY_RESTRICT sums) {
   constexpr std::size_t C = Model::traits.coefficient_count;
-  HWY_ALIGN Lane sums[kGroupModels * lanes()];
-  std::fill_n(sums, models * lanes(), Lane{0});
-  const Vector scales = hn::Set(FloatTag(), scale);
   const float* rows[kGroupModels];
-  Lane* places[kGroupModels];
+  typename Sums::Lane* places[kGroupModels];
   std::size_t listed = 0;
   const auto list = [&](std::size_t j) HWY_ATTR {
     rows[listed] = coefficients + j * C;
-    places[listed] = sums + j * lanes();
+    places[listed] = sums + j * Sums::kLanes;
     ++listed;
   };
   if (blocks == nullptr) {
     for (std::size_t j = 0; j < models; ++j) list(j);
-    add_all<Model, loss, Sums>(tile, scales, rows, places, models);
+    return add_all<Model, loss, Sums>(tile, form, rows, places, models);
   }
-  for (std::size_t block = 0; blocks != nullptr && block < tile.blocks; ++block) {
+  for (std::size_t block = 0; block < tile.blocks; ++block) {
     listed = 0;
     for (std::size_t j = 0; j < models; ++j) {
       if (((blocks[j] >> block) & 1U) != 0) list(j);
     }
-    add_listed<Model, loss, Sums>(tile, {block, block + 1}, scales, rows, places, listed);
+    add_listed<Model, loss, Sums>(tile, {block, block + 1}, form, rows, places, listed);
   }
-  for (std::size_t j = 0; j < models; ++j) Sums::finish(sums + j * lanes(), costs[j]);
 }
 
-void add_costs(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
-               PartialCost* costs) {
+void add_units(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
+               const std::uint8_t* blocks, std::int32_t* lane_units) {
   constexpr Loss l1 = Loss::truncated_l1, l2 = Loss::truncated_l2;
+  const QuantumSums form(summing.scale);
   visit_model(kind, [&]<class Model>() HWY_ATTR {
-    if (summing.scale > 0) {
-      if (summing.loss == l1) return add_costs_of<Model, l1, QuantumSums>(tile, summing.scale, coefficients, models, nullptr, costs);
-      return add_costs_of<Model, l2, QuantumSums>(tile, summing.scale, coefficients, models, nullptr, costs);
-    }
-    if (summing.loss == l1) return add_costs_of<Model, l1, FloatSums>(tile, 0, coefficients, models, nullptr, costs);
-    return add_costs_of<Model, l2, FloatSums>(tile, 0, coefficients, models, nullptr, costs);
+    if (summing.loss == l1) return add_lanes<Model, l1>(tile, form, coefficients, models, blocks, lane_units);
+    add_lanes<Model, l2>(tile, form, coefficients, models, blocks, lane_units);
   });
 }
 
-void add_open_costs(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
-                    const std::uint8_t* blocks, PartialCost* costs) {
-  constexpr Loss l1 = Loss::truncated_l1, l2 = Loss::truncated_l2;
+void settle_units(std::int32_t* HWY_RESTRICT lane_units, std::size_t models, std::int64_t* HWY_RESTRICT units) {
+  for (std::size_t j = 0; j < models; ++j, lane_units += kMaxLanes) {
+    std::int64_t sum = 0;
+    for (std::size_t lane = 0; lane < kMaxLanes; ++lane) sum += lane_units[lane];
+    std::fill_n(lane_units, kMaxLanes, 0);
+    units[j] += sum;
+  }
+}
+
+void add_values(ModelKind kind, Loss loss, const TileView& tile, const float* coefficients, std::size_t models, double* values) {
+  HWY_ALIGN float sums[kGroupModels * lanes()];
+  std::fill_n(sums, models * lanes(), 0.0F);
   visit_model(kind, [&]<class Model>() HWY_ATTR {
-    if (summing.loss == l1) return add_costs_of<Model, l1, QuantumSums>(tile, summing.scale, coefficients, models, blocks, costs);
-    return add_costs_of<Model, l2, QuantumSums>(tile, summing.scale, coefficients, models, blocks, costs);
+    if (loss == Loss::truncated_l1) return add_lanes<Model, Loss::truncated_l1>(tile, FloatSums(), coefficients, models, nullptr, sums);
+    add_lanes<Model, Loss::truncated_l2>(tile, FloatSums(), coefficients, models, nullptr, sums);
   });
+  for (std::size_t j = 0; j < models; ++j) {
+    for (std::size_t lane = 0; lane < lanes(); ++lane) values[j] += static_cast<double>(sums[j * lanes() + lane]);
+  }
 }
 
 /// In the same order as block_sums, with every loss at its limit.
 template <Loss loss>
 HWY_INLINE void cap_units_of(const TileView& tile, float scale, std::int32_t* units) {
   const FloatTag d;
+  const QuantumSums form(scale);
   for (std::size_t block = 0; block < tile.blocks; ++block) {
     Vector sum[kAccumulators];
     for (Vector& s : sum) s = hn::Zero(d);
@@ -289,7 +296,7 @@ HWY_INLINE void cap_units_of(const TileView& tile, float scale, std::int32_t* un
       for (std::size_t a = 0; a < kAccumulators; ++a) sum[a] = hn::Add(sum[a], limit_of<loss>(hn::Load(d, caps + i + a * lanes())));
     }
     HWY_ALIGN std::int32_t lane_units[lanes()] = {};
-    QuantumSums::add(total_of(sum), hn::Set(d, scale), lane_units);
+    form.add(total_of(sum), lane_units);
     units[block] = 0;
     for (const std::int32_t lane : lane_units) units[block] += lane;
   }
@@ -473,8 +480,9 @@ double spin_fma(std::size_t rounds, float* sink) {
 const CpuKernels& kernel_table() {
   static const CpuKernels table{hwy::TargetName(HWY_TARGET),
                                 lanes(),
-                                add_costs,
-                                add_open_costs,
+                                add_values,
+                                add_units,
+                                settle_units,
                                 cap_units,
                                 bound,
                                 distances,

@@ -21,14 +21,6 @@ inline constexpr std::size_t kMaxLanes = 16;
 /// Models whose partial sums are kept side by side while they pass over a tile.
 inline constexpr std::size_t kGroupModels = 128;
 
-/// A model's cost over part of the cloud. In the exact form, `units` counts quanta: a block's lane sums are rounded to whole ones, so that
-/// sums over blocks may be taken in any order, and by any number of threads, with the same outcome. Where caps are so much larger than
-/// the cloud that quanta would be too coarse, `value` adds up floating point in a fixed order instead.
-struct PartialCost {
-  std::int64_t units = 0;
-  double value = 0;
-};
-
 /// Columns of points, aligned to a cache line, and their caps: where a tile starts.
 struct TileView {
   const float* columns[kMaxDimension] = {};
@@ -36,7 +28,9 @@ struct TileView {
   std::size_t blocks = 0;
 };
 
-/// How losses are summed: `scale` quanta a unit of cost, or 0 for floating point. A block's losses stay below 2^27 quanta.
+/// How losses are summed. Exact: `scale` quanta a unit of cost, a power of two; a block's lane sums are rounded to whole ones, so that sums
+/// over blocks may be taken in any order, and by any number of threads, with the same outcome. A block's losses stay below 2^27 quanta. Where
+/// caps are so much larger than the cloud that quanta would be too coarse, `scale` is 0, and floating point is added up in a fixed order.
 struct Summing {
   Loss loss = Loss::truncated_l1;
   float scale = 0;
@@ -89,14 +83,17 @@ struct CpuKernels {
   const char* name;
   std::size_t lanes;
 
-  /// costs[j] += the losses of the tile's points to model j, for at most kGroupModels models with `coefficients` row after row. A model's
-  /// sum does not depend on the others.
-  void (*add_costs)(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
-                    PartialCost* costs);
+  /// values[j] += the losses of the tile's points to model j, for at most kGroupModels models with `coefficients` row after row, in floating
+  /// point. A model's sum does not depend on the others.
+  void (*add_values)(ModelKind kind, Loss loss, const TileView& tile, const float* coefficients, std::size_t models, double* values);
 
-  /// The same over those blocks of the tile whose bit is set in blocks[j]; exact form only.
-  void (*add_open_costs)(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
-                         const std::uint8_t* blocks, PartialCost* costs);
+  /// The same in quanta, in lanes: kMaxLanes numbers a model, on a cache line. `blocks`: null for all, else a bit a block for each model. Lanes
+  /// hold what `lanes` tiles cost.
+  void (*add_units)(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
+                    const std::uint8_t* blocks, std::int32_t* lane_units);
+
+  /// units[j] += model j's lanes, which are 0 thereafter.
+  void (*settle_units)(std::int32_t* lane_units, std::size_t models, std::int64_t* units);
 
   /// Quanta of each block of the tile for a model that explains none of its points; exact form only.
   void (*cap_units)(const Summing& summing, const TileView& tile, std::int32_t* units);

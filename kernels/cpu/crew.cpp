@@ -39,7 +39,7 @@ void breathe() {
 /// Written by the caller of `run`, read by helpers. A helper counts itself `inside` before it looks whether there is work; the caller ends
 /// the work and then waits until nobody is inside, so that nobody sees half of the next.
 struct Crew::Shared {
-  Body body = nullptr;
+  Work job{};
   void* context = nullptr;
   std::exception_ptr failure;
   std::atomic_flag failed;
@@ -74,15 +74,17 @@ struct Crew::Shared {
       Share& share = shares[(own + s) % shares.size()];
       while (share.next.load(std::memory_order_relaxed) < share.end) {
         const std::size_t task = share.next.fetch_add(1, std::memory_order_relaxed);
-        if (task < share.end) do_one(task, own);
+        if (task < share.end) attempt([&] { job.body(context, task, own); });
       }
     }
+    attempt([&] { job.finish(context, own); });
   }
 
-  void do_one(std::size_t task, std::size_t member) {
+  template <class Do>
+  void attempt(Do&& act) {
     if (failed.test(std::memory_order_relaxed)) return;
     try {
-      body(context, task, member);
+      act();
     } catch (...) {
       if (!failed.test_and_set()) failure = std::current_exception();
     }
@@ -136,7 +138,9 @@ class Crew::Arena {
 // The arena is made here and not in the first fit, and its threads are called once: what TBB looks up about the machine, and starting
 // them, takes milliseconds.
 Crew::Crew(int threads)
-    : helpers_(threads - 1), shared_(std::make_unique<Shared>(static_cast<std::size_t>(threads))), arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
+    : helpers_(threads - 1),
+      shared_(std::make_unique<Shared>(static_cast<std::size_t>(threads))),
+      arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
   if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
 
@@ -165,14 +169,15 @@ void Crew::call_helpers(std::size_t wanted) {
   }
 }
 
-void Crew::run(std::size_t tasks, Body body, void* context) {
+void Crew::run(std::size_t tasks, const Work& work, void* context) {
   if (tasks == 0) return;
   if (helpers_ == 0 || tasks == 1) {
-    for (std::size_t task = 0; task < tasks; ++task) body(context, task, 0);
+    for (std::size_t task = 0; task < tasks; ++task) work.body(context, task, 0);
+    work.finish(context, 0);
     return;
   }
   Shared& shared = *shared_;
-  shared.body = body;
+  shared.job = work;
   shared.context = context;
   shared.failed.clear();
   shared.share_out(tasks);

@@ -19,10 +19,13 @@ class Crew {
 
   int threads() const noexcept { return helpers_ + 1; }
 
-  /// body(context, task, member) for each task, in any order and on any thread. No two threads are the same member, of `threads()`, at a
-  /// time; the caller is the first. The first exception is thrown here, when all have ended.
-  using Body = void (*)(void* context, std::size_t task, std::size_t member);
-  void run(std::size_t tasks, Body body, void* context);
+  struct Work {
+    void (*body)(void* context, std::size_t task, std::size_t member);
+    void (*finish)(void* context, std::size_t member);
+  };
+  /// work.body for each task, in any order and on any thread, and work.finish of each member that took part, the last of its doing. No two
+  /// threads are the same member, of `threads()`, at a time; the caller is the first. The first exception is thrown here, when all have ended.
+  void run(std::size_t tasks, const Work& work, void* context);
 
  private:
   struct Shared;

@@ -27,9 +27,9 @@ struct Runs {
   std::size_t points, tiles, length, count;
 };
 
-/// body(run, first model, models, member) for each run of tiles and group of models.
-template <class Body>
-void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
+/// body(run, first model, models, member) for each run of tiles and group of models; then finish(member).
+template <class Body, class Finish>
+void for_tasks(const Runs& runs, std::size_t models, Body&& body, Finish&& finish) {
   const std::size_t groups = (models + kGroupModels - 1) / kGroupModels;
   // Alike in size, and whole register tiles but for the last group.
   constexpr std::size_t kMultiple = 8;
@@ -46,9 +46,10 @@ void for_tasks(const Runs& runs, std::size_t models, Body&& body) {
   };
   const std::size_t tasks = groups > 0 ? runs.count * parts : 0;
   if (worth_sharing(runs.points, models)) {
-    for_each_task_as_member(tasks, one);
+    for_each_task_as_member(tasks, one, finish);
   } else {
     for (std::size_t task = 0; task < tasks; ++task) one(task, 0);
+    finish(0);
   }
 }
 
@@ -68,7 +69,10 @@ float below(double value) { return std::nextafter(static_cast<float>(value), 0.0
 
 std::uint64_t SwarmCosts::evaluate(PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs) {
   const Summing summing = points.summing(loss);
-  if (!prune_now(points, swarm, summing)) return evaluate_all(points, swarm, summing, costs);
+  if (!prune_now(points, swarm, summing)) {
+    evaluate_all(points, swarm, summing, costs);
+    return points.finite() * swarm.count;
+  }
   const std::uint64_t touched = evaluate_open(points, swarm, summing, costs);
   pause_.note(static_cast<double>(touched) / (static_cast<double>(points.finite()) * static_cast<double>(swarm.count)));
   return touched;
@@ -79,38 +83,71 @@ bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, 
   return pause_.now();
 }
 
-std::uint64_t SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                                       std::span<float> costs) {
-  const Runs runs(points);
-  const bool exact = summing.scale > 0;
-  sums_.resize(std::max(sums_.size(), exact ? workers() : runs.count));
-  ++swarm_;
-  const auto begin = [&](Sums& sums) {
-    sums.swarm = swarm_;
-    sums.costs.assign(swarm.count, {});
-  };
-  if (!exact) std::for_each_n(sums_.begin(), runs.count, begin);
-  for_tasks(runs, swarm.count, [&](std::size_t run, std::size_t first, std::size_t models, std::size_t member) {
-    Sums& sums = sums_[exact ? member : run];
-    if (exact && sums.swarm != swarm_) begin(sums);
-    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.add_costs(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
-                         sums.costs.data() + first);
-    }
-  });
-  totals_.assign(swarm.count, {});
-  for (const Sums& sums : sums_) {
-    if (sums.swarm != swarm_) continue;
-    for (std::size_t j = 0; j < swarm.count; ++j) {
-      totals_[j].units += sums.costs[j].units;
-      totals_[j].value += sums.costs[j].value;
-    }
+void SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
+  if (summing.scale > 0) {
+    sum_units(points, swarm, summing, costs);
+  } else {
+    sum_values(points, swarm, summing.loss, costs);
   }
   for (std::size_t j = 0; j < swarm.count; ++j) {
-    const double cost = exact ? static_cast<double>(totals_[j].units) / static_cast<double>(summing.scale) : totals_[j].value;
-    costs[j] = swarm.finite[j] ? static_cast<float>(cost) : std::numeric_limits<float>::infinity();
+    if (!swarm.finite[j]) costs[j] = std::numeric_limits<float>::infinity();
   }
-  return points.finite() * swarm.count;
+}
+
+void SwarmCosts::sum_units(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
+  const Runs runs(points);
+  const std::size_t width = width_of(swarm.kind);
+  units_.resize(std::max(units_.size(), workers()));
+  ++swarm_;
+  const auto settle = [&](Units& own, std::size_t first, std::size_t models) {
+    kernels_.settle_units(own.lanes.data() + first * kMaxLanes, models, own.units.data() + first);
+  };
+  const auto add = [&](std::size_t run, std::size_t first, std::size_t models, std::size_t member) {
+    Units& own = units_[member];
+    if (own.swarm != swarm_) {
+      own.swarm = swarm_;
+      own.lanes.assign(swarm.count * kMaxLanes, 0);
+      own.tiles.assign(swarm.count, 0);
+      own.units.assign(swarm.count, 0);
+    }
+    std::size_t& held = own.tiles[first];
+    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
+      kernels_.add_units(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width, models, nullptr,
+                         own.lanes.data() + first * kMaxLanes);
+      if (++held < kernels_.lanes) continue;
+      settle(own, first, models);
+      held = 0;
+    }
+  };
+  for_tasks(runs, swarm.count, add, [&](std::size_t member) {
+    if (Units& own = units_[member]; own.swarm == swarm_) settle(own, 0, swarm.count);
+  });
+  total_units_.assign(swarm.count, 0);
+  for (const Units& own : units_) {
+    if (own.swarm != swarm_) continue;
+    for (std::size_t j = 0; j < swarm.count; ++j) total_units_[j] += own.units[j];
+  }
+  for (std::size_t j = 0; j < swarm.count; ++j) {
+    costs[j] = static_cast<float>(static_cast<double>(total_units_[j]) / static_cast<double>(summing.scale));
+  }
+}
+
+void SwarmCosts::sum_values(const PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs) {
+  const Runs runs(points);
+  values_.resize(std::max(values_.size(), runs.count));
+  for (std::size_t run = 0; run < runs.count; ++run) values_[run].assign(swarm.count, 0.0);
+  const auto add = [&](std::size_t run, std::size_t first, std::size_t models, std::size_t) {
+    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
+      kernels_.add_values(swarm.kind, loss, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
+                          values_[run].data() + first);
+    }
+  };
+  for_tasks(runs, swarm.count, add, [](std::size_t) {});
+  for (std::size_t j = 0; j < swarm.count; ++j) {
+    double cost = 0;
+    for (std::size_t run = 0; run < runs.count; ++run) cost += values_[run][j];
+    costs[j] = static_cast<float>(cost);
+  }
 }
 
 std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
@@ -188,7 +225,9 @@ void OpenGroup::add(const CpuKernels& kernels, const PointStore& points, const C
   for (std::size_t a = 0; a < alive_.size(); ++a) {
     std::copy_n(swarm.coefficients.data() + alive_[a] * width, width, coefficients_.data() + a * width);
   }
-  sums_.assign(alive_.size(), {});
+  lanes_.assign(alive_.size() * kMaxLanes, 0);
+  units_.assign(alive_.size(), 0);
+  std::size_t held = 0;  // tiles
   std::array<std::uint8_t, kGroupModels> bits{};
   for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
     unsigned any = 0;
@@ -198,9 +237,13 @@ void OpenGroup::add(const CpuKernels& kernels, const PointStore& points, const C
       touched_ += static_cast<std::uint64_t>(std::popcount(bits[a])) * kBlockPoints;
     }
     if (any == 0) continue;
-    kernels.add_open_costs(swarm.kind, summing, points.tile(tile), coefficients_.data(), alive_.size(), bits.data(), sums_.data());
+    kernels.add_units(swarm.kind, summing, points.tile(tile), coefficients_.data(), alive_.size(), bits.data(), lanes_.data());
+    if (++held < kernels.lanes) continue;
+    kernels.settle_units(lanes_.data(), alive_.size(), units_.data());
+    held = 0;
   }
-  for (std::size_t a = 0; a < alive_.size(); ++a) bounds_[alive_[a]].settled += sums_[a].units;
+  kernels.settle_units(lanes_.data(), alive_.size(), units_.data());
+  for (std::size_t a = 0; a < alive_.size(); ++a) bounds_[alive_[a]].settled += units_[a];
 }
 
 }  // namespace swarmfit::kernels::cpu

@@ -39,7 +39,8 @@ class OpenGroup {
   std::vector<PartialBound> bounds_;  ///< a model: what is settled, and bounds of the rest
   std::vector<std::uint32_t> alive_;  ///< models whose cost may still be below the cutoff
   std::vector<float> coefficients_;   ///< of those alive
-  std::vector<PartialCost> sums_;     ///< of those alive
+  Aligned<std::int32_t> lanes_;       ///< of those alive, kMaxLanes each
+  std::vector<std::int64_t> units_;   ///< of those alive
   std::uint64_t touched_ = 0;
 };
 
@@ -57,21 +58,26 @@ class SwarmCosts {
 
  private:
   bool prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing);
-  std::uint64_t evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
+  void evaluate_all(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
+  void sum_units(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
+  void sum_values(const PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs);
   std::uint64_t evaluate_open(PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
 
   const CpuKernels& kernels_;
   bool pruning_;
   PruningPause pause_{0.8};
 
-  /// Of one thread or one run of tiles; begun anew with each swarm. What another core wrote is slow to get at,
-  /// so there are few, and each is written by one thread alone.
-  struct alignas(64) Sums {
+  /// One thread's in quanta, begun anew with each swarm. What another core wrote is slow to get at, so lanes are added up by the thread
+  /// whose they are.
+  struct alignas(64) Units {
     std::uint64_t swarm = 0;
-    Aligned<PartialCost> costs;
+    Aligned<std::int32_t> lanes;     ///< kMaxLanes a model
+    std::vector<std::size_t> tiles;  ///< how many the lanes of a group of models hold, at its first
+    Aligned<std::int64_t> units;     ///< a model
   };
-  std::vector<Sums> sums_;
-  std::vector<PartialCost> totals_;     ///< a model
+  std::vector<Units> units_;             ///< a thread
+  std::vector<Aligned<double>> values_;  ///< a run of tiles: floating point, a model
+  std::vector<std::int64_t> total_units_;
   std::uint64_t swarm_ = 0;             ///< number of the present one
   std::vector<std::uint64_t> touched_;  ///< a group of models
 };

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <memory>
 #include <type_traits>
 #include <utility>
 
@@ -32,16 +31,21 @@ inline Crew*& current_crew() noexcept {
 /// Threads that tasks are shared out to where this is called.
 inline std::size_t workers() noexcept { return current_crew() != nullptr ? static_cast<std::size_t>(current_crew()->threads()) : 1; }
 
-/// body(task, member) for each task on the threads of the crew, which are members below `workers()`; here where there is none.
-template <class Body>
-void for_each_task_as_member(std::size_t tasks, Body&& body) {
+/// body(task, member) for each task on the threads of the crew, which are members below `workers()`; here where there is none. A member that
+/// finds no more tasks ends with finish(member).
+template <class Body, class Finish>
+void for_each_task_as_member(std::size_t tasks, Body&& body, Finish&& finish) {
   if (Crew* crew = current_crew(); crew != nullptr) {
-    using Callable = std::remove_reference_t<Body>;
-    crew->run(
-        tasks, [](void* context, std::size_t task, std::size_t member) { (*static_cast<Callable*>(context))(task, member); },
-        const_cast<void*>(static_cast<const void*>(std::addressof(body))));
+    struct Both {
+      std::remove_reference_t<Body>& body;
+      std::remove_reference_t<Finish>& finish;
+    } both{body, finish};
+    const Crew::Work work{[](void* context, std::size_t task, std::size_t member) { static_cast<Both*>(context)->body(task, member); },
+                          [](void* context, std::size_t member) { static_cast<Both*>(context)->finish(member); }};
+    crew->run(tasks, work, &both);
   } else {
     for (std::size_t task = 0; task < tasks; ++task) body(task, std::size_t{0});
+    finish(std::size_t{0});
   }
 }
 
@@ -52,7 +56,8 @@ void for_each_task(std::size_t tasks, Body&& body) {
   if (tasks == 1) {
     body(std::size_t{0});
   } else if (current_crew() != nullptr) {
-    for_each_task_as_member(tasks, [&](std::size_t task, std::size_t) { body(task); });
+    for_each_task_as_member(
+        tasks, [&](std::size_t task, std::size_t) { body(task); }, [](std::size_t) {});
   } else if (tasks > 1) {
     tbb::parallel_for(std::size_t{0}, tasks, body);
   }
