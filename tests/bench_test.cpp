@@ -121,6 +121,20 @@ TEST(Bench, TakesTheCloudItIsGiven) {
   }
 }
 
+TEST(Bench, CountsFinitePointsAlone) {
+  std::vector<float> values = bench_internal::synthetic_points(ModelType::plane, 900, 5);
+  for (std::size_t i = 0; i < 300; ++i) values[9 * i + i % 3] = std::numeric_limits<float>::quiet_NaN();
+  const PointsView cloud(std::span<const float>(values), 3);
+  BenchOptions options = small();
+  options.models = {ModelType::plane};
+  const auto report = bench(options, &cloud);
+  ASSERT_TRUE(report) << report.error().message;
+  for (const BenchRow& row : report->rows) {
+    EXPECT_EQ(row.points, 600U);
+    EXPECT_NEAR(row.evaluations_per_s * row.seconds, 600.0 * static_cast<double>(row.particles), 1e-6 * 600);
+  }
+}
+
 TEST(BenchCase, HoldsTheStepsOfASwarm) {
   const std::vector<float> values = bench_internal::synthetic_points(ModelType::line2d, 1000, 3);
   const PointsView points(std::span<const float>(values), 2);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <new>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -14,6 +15,7 @@
 #include "host/bench/bench_case.hpp"
 #include "host/models/model_space.hpp"
 #include "host/swarm/landscape.hpp"
+#include "host/swarm/subset.hpp"
 #include "kernels/evaluators.hpp"
 #include "kernels/machine_limit.hpp"
 
@@ -201,6 +203,16 @@ Expected<> run_cloud(Bench& bench, const BenchOptions& options, ModelType type, 
   return {};
 }
 
+/// Rows that are finite: the others are no work, and would flatter every rate.
+swarm::Rows finite_rows(const PointsView& cloud) {
+  const models::WorkingPoints working(cloud);
+  std::vector<std::uint32_t> index;
+  for (std::size_t i = 0; i < working.size(); ++i) {
+    if (working.finite(i)) index.push_back(static_cast<std::uint32_t>(i));
+  }
+  return {working.view(), index};
+}
+
 }  // namespace
 
 Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud,
@@ -219,6 +231,8 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
       if (!cloud || cloud->dimension() == dimension(type)) types.push_back(type);
     }
   }
+  std::optional<swarm::Rows> rows;
+  if (cloud) rows = finite_rows(*cloud);
   Bench runner(options, progress);
   if (auto done = runner.raise_limit(); !done) return tl::unexpected(done.error());
   for (const ModelType type : types) {
@@ -227,7 +241,7 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
         return fail(Error::Kind::bad_input,
                     fmt::format("points have {} columns, must have {} to bench a {}", cloud->dimension(), dimension(type), name(type)));
       }
-      auto done = run_cloud(runner, options, type, *cloud, backends);
+      auto done = run_cloud(runner, options, type, rows->view(), backends);
       // A cloud need not determine every kind of its dimension; only those that were asked for by name must be there.
       const bool undetermined = !done && done.error().kind == Error::Kind::bad_input && options.models.empty();
       if (!done && !undetermined) return tl::unexpected(done.error());

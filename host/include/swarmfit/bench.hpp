@@ -27,7 +27,8 @@ struct BenchOptions {
 
 struct BenchRow {
   std::string backend, device, model;
-  std::size_t points = 0, particles = 0;
+  std::size_t points = 0;  ///< finite ones
+  std::size_t particles = 0;
   bool pruning = false;
   double evaluations_per_s = 0;   ///< points x particles a second; effective, with pruning
   double fraction_of_limit = 0;   ///< of fma_per_s over the model's own count of FMAs
