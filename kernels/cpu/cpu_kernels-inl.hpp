@@ -233,20 +233,19 @@ HWY_INLINE void add_lanes(const TileView& tile, const Sums& form, const float* H
   constexpr std::size_t C = Model::traits.coefficient_count;
   const float* rows[kGroupModels];
   typename Sums::Lane* places[kGroupModels];
-  std::size_t listed = 0;
-  const auto list = [&](std::size_t j) HWY_ATTR {
-    rows[listed] = coefficients + j * C;
-    places[listed] = sums + j * Sums::kLanes;
-    ++listed;
-  };
   if (blocks == nullptr) {
-    for (std::size_t j = 0; j < models; ++j) list(j);
+    for (std::size_t j = 0; j < models; ++j) {
+      rows[j] = coefficients + j * C;
+      places[j] = sums + j * Sums::kLanes;
+    }
     return add_all<Model, loss, Sums>(tile, form, rows, places, models);
   }
   for (std::size_t block = 0; block < tile.blocks; ++block) {
-    listed = 0;
-    for (std::size_t j = 0; j < models; ++j) {
-      if (((blocks[j] >> block) & 1U) != 0) list(j);
+    std::size_t listed = 0;
+    for (std::size_t j = 0; j < models; ++j) {  // without a branch, for nobody could foresee it
+      rows[listed] = coefficients + j * C;
+      places[listed] = sums + j * Sums::kLanes;
+      listed += (blocks[j] >> block) & 1U;
     }
     add_listed<Model, loss, Sums>(tile, {block, block + 1}, form, rows, places, listed);
   }
@@ -394,6 +393,8 @@ struct BlockBounder {
       for (std::size_t s = 0; s < D; ++s) {
         sum = hn::Max(sum, hn::Abs(hn::MulAdd(load(Field::sign_sum + s), middle, dot(gradient, Field::signed_offset + 3 * s))));
       }
+      // |d| is convex: with the sides of a model near this one that is its cost and the slope of it, and near a minimum there is none.
+      sum = hn::Max(sum, hn::Abs(hn::MulAdd(load(Field::side_sum), middle, dot(gradient, Field::side_offset))));
       sum = hn::Mul(hn::NegMulAdd(hn::Add(count, count), mean_slack, sum), share);
       least = hn::Max(sum, hn::Mul(load(Field::cap_sum), cap_share));
     } else {
@@ -448,6 +449,38 @@ void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coeff
   });
 }
 
+template <class Model>
+HWY_INLINE void take_sides_of(const TileView& tile, const float* HWY_RESTRICT coefficients, TileBounds& bounds) {
+  constexpr std::size_t D = Model::traits.dimension;
+  const FloatTag d;
+  const Vector zero = hn::Zero(d), one = hn::Set(d, 1.0F);
+  Vector k[Model::traits.coefficient_count];
+  for (int c = 0; c < Model::traits.coefficient_count; ++c) k[c] = hn::Set(d, coefficients[c]);
+  for (std::size_t block = 0; block < tile.blocks; ++block) {
+    Vector mean[D], sides = zero, offset[D];
+    for (std::size_t c = 0; c < D; ++c) {
+      mean[c] = hn::Set(d, bounds.field[Field::mean + c][block]);
+      offset[c] = zero;
+    }
+    for (std::size_t i = block * kBlockPoints; i < (block + 1) * kBlockPoints; i += lanes()) {
+      Vector x[D];
+      for (std::size_t c = 0; c < D; ++c) x[c] = hn::Load(d, tile.columns[c] + i);
+      const auto counts = hn::Gt(hn::Load(d, tile.caps + i), zero);
+      const Vector side = hn::IfThenElseZero(counts, hn::CopySign(one, Model::residual(VectorMath(), x, k)));
+      sides = hn::Add(sides, side);
+      for (std::size_t c = 0; c < D; ++c) offset[c] = hn::MulAdd(side, hn::Sub(x[c], mean[c]), offset[c]);
+    }
+    bounds.field[Field::side_sum][block] = hn::GetLane(hn::SumOfLanes(d, sides));
+    for (std::size_t c = 0; c < D; ++c) bounds.field[Field::side_offset + c][block] = hn::GetLane(hn::SumOfLanes(d, offset[c]));
+  }
+}
+
+void take_sides(ModelKind kind, const TileView& tile, const float* coefficients, TileBounds& bounds) {
+  visit_model(kind, [&]<class Model>() HWY_ATTR {
+    if constexpr (Model::traits.bounded) take_sides_of<Model>(tile, coefficients, bounds);
+  });
+}
+
 #include "kernels/cpu/point_passes.inl"
 
 /// As many chains as hide the latency of two multiply-adds a cycle and still fit the registers.
@@ -485,6 +518,7 @@ const CpuKernels& kernel_table() {
                                 settle_units,
                                 cap_units,
                                 bound,
+                                take_sides,
                                 distances,
                                 keep_nearest,
                                 split,

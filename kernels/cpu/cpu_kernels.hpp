@@ -39,10 +39,11 @@ struct Summing {
 /// Where the fields of BlockBounds lie in TileBounds.
 struct Field {
   static constexpr std::size_t count = 0, least_cap = 1, most_cap = 2, cap_sum = 3, mean = 4, axis = 7, spread = 16, signed_offset = 19,
-                               sign_sum = 28, radius = 31, mean_square = 32, all = 33;
+                               sign_sum = 28, radius = 31, mean_square = 32, side_offset = 33, side_sum = 36, all = 37;
 };
 
-/// Bounds of a tile's blocks side by side. Blocks that are not there are beyond every model's reach and cost nothing.
+/// Bounds of a tile's blocks side by side. Blocks that are not there are beyond every model's reach and cost nothing. `side_offset` and
+/// `side_sum` are one more set of signs as BlockBounds has them: on which side of the best model so far each point is, 0 before there is one.
 struct TileBounds {
   alignas(64) float field[Field::all][kTileBlocks];
   alignas(64) std::int32_t cap_units[kTileBlocks];  ///< cost of a block whose points are all beyond their caps
@@ -101,6 +102,9 @@ struct CpuKernels {
   /// Bounds of models of a bounded kind over a tile. slack[j] is what rounding may do to a distance of model j.
   void (*bound)(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models,
                 Open* open, PartialBound* bounds);
+
+  /// Which side of the model each point is on, into the bounds of its tile.
+  void (*take_sides)(ModelKind kind, const TileView& tile, const float* coefficients, TileBounds& bounds);
 
   /// |dist| of the tile's points to one model.
   void (*distances)(ModelKind kind, const TileView& tile, const float* coefficients, float* out);

@@ -202,6 +202,10 @@ void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summin
   bounds_summing_ = summing;
 }
 
+void PointStore::take_sides(const CpuKernels& kernels, ModelKind kind, const float* coefficients) {
+  for_each_task(tiles(), [&](std::size_t index) { kernels.take_sides(kind, tile(index), coefficients, bounds_[index]); });
+}
+
 TileView PointStore::tile(std::size_t index) const noexcept {
   TileView view;
   const std::size_t first = index * kTilePoints;
@@ -218,10 +222,12 @@ void pack_bounds(const BlockBounds& block, std::size_t at, TileBounds& tile) {
   tile.field[Field::cap_sum][at] = block.cap_sum;
   tile.field[Field::radius][at] = block.radius;
   tile.field[Field::mean_square][at] = block.mean_square;
+  tile.field[Field::side_sum][at] = 0;
   for (std::size_t c = 0; c < 3; ++c) {
     tile.field[Field::mean + c][at] = block.mean[c];
     tile.field[Field::spread + c][at] = block.spread[c];
     tile.field[Field::sign_sum + c][at] = block.sign_sum[c];
+    tile.field[Field::side_offset + c][at] = 0;
     for (std::size_t e = 0; e < 3; ++e) {
       tile.field[Field::axis + 3 * e + c][at] = block.axis[e][c];
       tile.field[Field::signed_offset + 3 * e + c][at] = block.signed_offset[e][c];

@@ -30,6 +30,8 @@ class PointStore {
   Summing summing(Loss loss) const noexcept;
   /// Brings bounds() up to date with the caps. Exact form of `summing` only.
   void prepare_bounds(const CpuKernels& kernels, const Summing& summing);
+  /// Tells the bounds, which are up to date, on which side of a model each point is: tighter for models near it, valid for all.
+  void take_sides(const CpuKernels& kernels, ModelKind kind, const float* coefficients);
 
   int dimension() const noexcept { return dimension_; }
   std::size_t count() const noexcept { return count_; }    ///< points given

@@ -62,6 +62,10 @@ CentredSwarm part_of(const CentredSwarm& swarm, std::size_t first, std::size_t m
   return {swarm.kind, models, swarm.coefficients.subspan(first * width, models * width), swarm.finite.subspan(first, models), cutoffs};
 }
 
+/// Tiles after which models that have lost are looked for.
+constexpr std::size_t kStretch = 4;
+std::size_t stretches(const PointStore& points) { return (points.tiles() + kStretch - 1) / kStretch; }
+
 /// Largest float that is not above `value`, and one less: sums in float and in double may differ in their last place.
 float below(double value) { return std::nextafter(static_cast<float>(value), 0.0F); }
 
@@ -168,6 +172,11 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
   } else {
     for (std::size_t g = 0; g < groups; ++g) one(g);
   }
+  const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  if (summing.loss == Loss::truncated_l1 && costs[best] < least_) {
+    least_ = costs[best];
+    points.take_sides(kernels_, swarm.kind, swarm.coefficients.data() + best * width_of(swarm.kind));
+  }
   const std::uint64_t touched = std::accumulate(touched_.begin(), touched_.end(), std::uint64_t{0});
   return std::min<std::uint64_t>(touched, points.finite() * swarm.count);  // padding was counted as well
 }
@@ -182,26 +191,26 @@ std::uint64_t OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& p
     costs[j] = std::numeric_limits<float>::infinity();
     return true;
   });
-  const auto drop_lost = [&] {
-    std::erase_if(alive_, [&](std::uint32_t j) {
-      const PartialBound& known = bounds_[j];
-      const float least = below(static_cast<double>(known.settled) / static_cast<double>(summing.scale) + known.mixed + known.within);
-      if (swarm.cutoffs.empty() || !(least >= swarm.cutoffs[j])) return false;
-      costs[j] = least;
-      return true;
-    });
-  };
   touched_ = 0;
+  drop_lost(swarm, summing, costs);
   // Blocks that straddle their caps are bounded loosest: they come first.
-  drop_lost();
-  add(kernels, points, swarm, summing, &Open::mixed);
-  for (const std::uint32_t j : alive_) bounds_[j].mixed = 0;
-  drop_lost();
-  add(kernels, points, swarm, summing, &Open::within);
+  add(kernels, points, swarm, summing, &Open::mixed, &PartialBound::mixed, costs);
+  add(kernels, points, swarm, summing, &Open::within, &PartialBound::within, costs);
   for (const std::uint32_t j : alive_) {
     costs[j] = static_cast<float>(static_cast<double>(bounds_[j].settled) / static_cast<double>(summing.scale));
   }
   return touched_;
+}
+
+void OpenGroup::drop_lost(const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
+  if (swarm.cutoffs.empty()) return;
+  std::erase_if(alive_, [&](std::uint32_t j) {
+    const PartialBound& known = bounds_[j];
+    const float least = below(static_cast<double>(known.settled) / static_cast<double>(summing.scale) + known.mixed + known.within);
+    if (!(least >= swarm.cutoffs[j])) return false;
+    costs[j] = least;
+    return true;
+  });
 }
 
 void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss) {
@@ -210,16 +219,33 @@ void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const
   const std::size_t models = swarm.count;
   slack_.resize(models);
   for (std::size_t j = 0; j < models; ++j) slack_[j] = residual_rounding(swarm.kind, coefficients + j * width, points.reach().data());
-  bounds_.assign(models, {});
+  parts_.assign(stretches(points) * models, {});
   open_.resize(points.tiles() * models);
   for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
-    kernels.bound(swarm.kind, loss, points.bounds(tile), coefficients, slack_.data(), models, open_.data() + tile * models, bounds_.data());
+    kernels.bound(swarm.kind, loss, points.bounds(tile), coefficients, slack_.data(), models, open_.data() + tile * models,
+                  parts_.data() + tile / kStretch * models);
+  }
+  bounds_.assign(models, {});
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    PartialBound& all = bounds_[k % models];
+    all.settled += parts_[k].settled;
+    all.within += parts_[k].within;
+    all.mixed += parts_[k].mixed;
   }
 }
 
 void OpenGroup::add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-                    std::uint8_t Open::*blocks) {
-  if (alive_.empty()) return;
+                    std::uint8_t Open::*blocks, double PartialBound::*least, std::span<float> costs) {
+  for (std::size_t stretch = 0; stretch < stretches(points) && !alive_.empty(); ++stretch) {
+    add_stretch(kernels, points, swarm, summing, blocks, stretch);
+    const bool last = stretch + 1 == stretches(points);
+    for (const std::uint32_t j : alive_) bounds_[j].*least = last ? 0.0 : bounds_[j].*least - parts_[stretch * swarm.count + j].*least;
+    drop_lost(swarm, summing, costs);
+  }
+}
+
+void OpenGroup::add_stretch(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                            std::uint8_t Open::*blocks, std::size_t stretch) {
   const std::size_t width = width_of(swarm.kind);
   coefficients_.resize(alive_.size() * width);
   for (std::size_t a = 0; a < alive_.size(); ++a) {
@@ -229,7 +255,8 @@ void OpenGroup::add(const CpuKernels& kernels, const PointStore& points, const C
   units_.assign(alive_.size(), 0);
   std::size_t held = 0;  // tiles
   std::array<std::uint8_t, kGroupModels> bits{};
-  for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
+  const std::size_t last = std::min(points.tiles(), (stretch + 1) * kStretch);
+  for (std::size_t tile = stretch * kStretch; tile < last; ++tile) {
     unsigned any = 0;
     for (std::size_t a = 0; a < alive_.size(); ++a) {
       bits[a] = open_[tile * swarm.count + alive_[a]].*blocks;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -30,12 +31,17 @@ class OpenGroup {
 
  private:
   void bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss);
-  /// What blocks of one sort cost the models that are alive.
+  /// What blocks of one sort cost the models that are alive: stretch by stretch, in place of their bounds, as long as a model may still win.
   void add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
-           std::uint8_t Open::*blocks);
+           std::uint8_t Open::*blocks, double PartialBound::*least, std::span<float> costs);
+  void add_stretch(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
+                   std::uint8_t Open::*blocks, std::size_t stretch);
+  /// Models whose bounds add up to their cutoff.
+  void drop_lost(const CentredSwarm& swarm, const Summing& summing, std::span<float> costs);
 
   std::vector<Open> open_;  ///< a tile and a model
   std::vector<float> slack_;
+  std::vector<PartialBound> parts_;   ///< a stretch of tiles and a model
   std::vector<PartialBound> bounds_;  ///< a model: what is settled, and bounds of the rest
   std::vector<std::uint32_t> alive_;  ///< models whose cost may still be below the cutoff
   std::vector<float> coefficients_;   ///< of those alive
@@ -52,7 +58,10 @@ class SwarmCosts {
   SwarmCosts(const CpuKernels& kernels, bool pruning) : kernels_(kernels), pruning_(pruning) {}
 
   /// New points or caps: what was learnt about how pruning pays is void.
-  void forget() noexcept { pause_.forget(); }
+  void forget() noexcept {
+    pause_.forget();
+    least_ = std::numeric_limits<float>::infinity();
+  }
   /// Fills costs; returns how many residuals were computed.
   std::uint64_t evaluate(PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs);
 
@@ -66,6 +75,7 @@ class SwarmCosts {
   const CpuKernels& kernels_;
   bool pruning_;
   PruningPause pause_{0.8};
+  float least_ = std::numeric_limits<float>::infinity();  ///< cost of the model whose sides the bounds know
 
   /// One thread's in quanta, begun anew with each swarm. What another core wrote is slow to get at, so lanes are added up by the thread
   /// whose they are.
