@@ -100,6 +100,8 @@ class Replay {
     std::vector<double> each;
     const auto start = Clock::now();
     while (each.size() < kLeastRepetitions || std::chrono::duration<double>(Clock::now() - start).count() < seconds) {
+      // As after each found model: what the steps of the time before taught the evaluator is forgotten.
+      if (auto done = evaluator_.set_caps(case_.caps); !done) return tl::unexpected(swarm::to_error(done.error()));
       const auto begin = Clock::now();
       for (const Step& step : case_.steps) {
         if (auto done = ask(step); !done) return tl::unexpected(done.error());

@@ -407,6 +407,18 @@ struct BlockBounder {
   }
 };
 
+/// Of a distance, which cannot change faster than one moves, at the centre of the tile's ball.
+template <class Model>
+HWY_INLINE bool out_of_reach(const TileBounds& tile, const float* HWY_RESTRICT coefficients, float slack) {
+  using One = hn::CappedTag<float, 1>;
+  constexpr std::size_t C = Model::traits.coefficient_count, D = Model::traits.dimension;
+  hn::Vec<One> k[C], x[D];
+  for (std::size_t c = 0; c < C; ++c) k[c] = hn::Set(One(), coefficients[c]);
+  for (std::size_t c = 0; c < D; ++c) x[c] = hn::Set(One(), tile.ball[c]);
+  const float distance = hn::GetLane(hn::Abs(Model::residual(MathOn<One>(), x, k)));
+  return distance - tile.ball_radius - slack > tile.ball_cap;
+}
+
 template <class Model, Loss loss>
 HWY_INLINE void bound_of(const TileBounds& tile, const float* HWY_RESTRICT coefficients, const float* HWY_RESTRICT slack,
                          std::size_t models, Open* HWY_RESTRICT open, PartialBound* HWY_RESTRICT bounds) {
@@ -414,6 +426,11 @@ HWY_INLINE void bound_of(const TileBounds& tile, const float* HWY_RESTRICT coeff
   const BlockTag d;
   const hn::RebindToSigned<BlockTag> di;
   for (std::size_t j = 0; j < models; ++j) {
+    if (out_of_reach<Model>(tile, coefficients + j * C, slack[j])) {
+      bounds[j].settled += tile.all_cap_units;
+      open[j] = {};
+      continue;
+    }
     BlockVector k[C];
     for (std::size_t c = 0; c < C; ++c) k[c] = hn::Set(d, coefficients[j * C + c]);
     BlockVector within_sum = hn::Zero(d), mixed_sum = hn::Zero(d);

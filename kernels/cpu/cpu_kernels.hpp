@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -47,6 +48,11 @@ struct Field {
 struct TileBounds {
   alignas(64) float field[Field::all][kTileBlocks];
   alignas(64) std::int32_t cap_units[kTileBlocks];  ///< cost of a block whose points are all beyond their caps
+  /// A ball about all of it, the largest cap in it, and the sum of cap_units: of a tile that is out of reach no block is looked at.
+  float ball[kMaxDimension] = {};
+  float ball_radius = 0;
+  float ball_cap = -std::numeric_limits<float>::infinity();
+  std::int64_t all_cap_units = 0;
 };
 
 /// What is known of a model over part of the cloud before any point is touched.
@@ -148,5 +154,7 @@ const std::vector<const CpuKernels*>& available_kernels();
 
 /// Bounds of one block into its place.
 void pack_bounds(const BlockBounds& block, std::size_t at, TileBounds& tile);
+/// The ball, of blocks and units that are in their places.
+void wrap_bounds(int dimension, TileBounds& tile);
 
 }  // namespace swarmfit::kernels::cpu

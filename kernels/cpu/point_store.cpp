@@ -1,4 +1,5 @@
 #include "kernels/cpu/point_store.hpp"
+#include <numeric>
 
 #include <algorithm>
 #include <cmath>
@@ -197,6 +198,7 @@ void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summin
       bounds.cap_units[block] = 0;
     }
     kernels.cap_units(summing, view, bounds.cap_units);
+    wrap_bounds(dimension_, bounds);
   });
   bounds_current_ = true;
   bounds_summing_ = summing;
@@ -233,6 +235,31 @@ void pack_bounds(const BlockBounds& block, std::size_t at, TileBounds& tile) {
       tile.field[Field::signed_offset + 3 * e + c][at] = block.signed_offset[e][c];
     }
   }
+}
+
+void wrap_bounds(int dimension, TileBounds& tile) {
+  const auto width = static_cast<std::size_t>(dimension);
+  tile.all_cap_units = std::accumulate(tile.cap_units, tile.cap_units + kTileBlocks, std::int64_t{0});
+  tile.ball_cap = *std::max_element(tile.field[Field::most_cap], tile.field[Field::most_cap] + kTileBlocks);
+  double count = 0;
+  std::array<double, kMaxDimension> mean{};
+  for (std::size_t block = 0; block < kTileBlocks; ++block) {
+    const auto here = static_cast<double>(tile.field[Field::count][block]);
+    count += here;
+    for (std::size_t c = 0; c < width; ++c) mean[c] += here * static_cast<double>(tile.field[Field::mean + c][block]);
+  }
+  for (std::size_t c = 0; c < width; ++c) tile.ball[c] = count > 0 ? static_cast<float>(mean[c] / count) : 0.0F;
+  double radius = 0;
+  for (std::size_t block = 0; block < kTileBlocks; ++block) {
+    if (tile.field[Field::count][block] == 0) continue;
+    double square = 0;
+    for (std::size_t c = 0; c < width; ++c) {
+      const double way = static_cast<double>(tile.field[Field::mean + c][block]) - static_cast<double>(tile.ball[c]);
+      square += way * way;
+    }
+    radius = std::max(radius, std::sqrt(square) + static_cast<double>(tile.field[Field::radius][block]));
+  }
+  tile.ball_radius = static_cast<float>(radius * (1 + 1e-5));
 }
 
 }  // namespace swarmfit::kernels::cpu

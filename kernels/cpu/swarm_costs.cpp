@@ -62,6 +62,8 @@ CentredSwarm part_of(const CentredSwarm& swarm, std::size_t first, std::size_t m
   return {swarm.kind, models, swarm.coefficients.subspan(first * width, models * width), swarm.finite.subspan(first, models), cutoffs};
 }
 
+/// Tiles from which on it pays to know the sides of the best model, for a pass over all points whenever there is a better one.
+constexpr std::size_t kTilesForSides = 16;
 /// Tiles after which models that have lost are looked for.
 constexpr std::size_t kStretch = 4;
 std::size_t stretches(const PointStore& points) { return (points.tiles() + kStretch - 1) / kStretch; }
@@ -173,7 +175,7 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
     for (std::size_t g = 0; g < groups; ++g) one(g);
   }
   const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-  if (summing.loss == Loss::truncated_l1 && costs[best] < least_) {
+  if (summing.loss == Loss::truncated_l1 && points.tiles() >= kTilesForSides && costs[best] < least_) {
     least_ = costs[best];
     points.take_sides(kernels_, swarm.kind, swarm.coefficients.data() + best * width_of(swarm.kind));
   }
