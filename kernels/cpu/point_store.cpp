@@ -1,10 +1,10 @@
 #include "kernels/cpu/point_store.hpp"
-#include <numeric>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 
 #include "kernels/cpu/tasks.hpp"
 
