@@ -105,10 +105,10 @@ Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<co
   return check_size("evidence.size()", evidence.size(), models.size());
 }
 
-Result<> check_claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<const std::uint16_t> labels,
-                     std::span<const Evidence> evidence, const OwnModel* own) {
+Result<> check_claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                     std::span<const std::uint16_t> labels, std::span<const Evidence> evidence, const OwnModel* own) {
   if (auto ok = check_points(points); !ok) return ok;
-  if (auto ok = check_assign(models, points.dimension, points.count, std::span<const float>(&tolerance, 1), labels, own); !ok) return ok;
+  if (auto ok = check_assign(models, points.dimension, points.count, tolerance, labels, own); !ok) return ok;
   return check_size("evidence.size()", evidence.size(), models.size());
 }
 

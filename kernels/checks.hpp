@@ -21,8 +21,8 @@ Result<> check_assign(std::span<const ModelView> models, int dimension, std::siz
                       std::span<const std::uint16_t> labels, const OwnModel* own = nullptr);
 Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<const float> distances,
                      std::span<const Evidence> evidence, const OwnModel* own = nullptr);
-Result<> check_claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<const std::uint16_t> labels,
-                     std::span<const Evidence> evidence, const OwnModel* own = nullptr);
+Result<> check_claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                     std::span<const std::uint16_t> labels, std::span<const Evidence> evidence, const OwnModel* own = nullptr);
 
 /// Finite flags of a cloud and the centre that makes its coordinates small: the middle of its bounding box.
 struct Extent {

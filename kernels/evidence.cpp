@@ -107,19 +107,20 @@ void weigh_points(const PointsView& points, const Weighing& how, std::span<const
   }
 }
 
-void claim_points(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                  std::span<Evidence> evidence) {
+void claim_points(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                  std::span<std::uint16_t> labels, std::span<Evidence> evidence) {
   const std::array<double, kMaxDimension> centre = middle(points);
   const std::vector<Residual> residual = residuals(models, centre.data());
   std::fill(labels.begin(), labels.end(), std::uint16_t{0});
   std::fill(evidence.begin(), evidence.end(), Evidence{});
   for (std::size_t i = 0; i < points.count; ++i) {
     if (!points.finite(i)) continue;
+    const auto widest = static_cast<double>(tolerance[tolerance.size() > 1 ? i : 0]);
     double nearest = std::numeric_limits<double>::infinity();
     for (std::size_t m = 0; m < models.size(); ++m) {
       const double d = residual[m](points, i);
-      evidence[m].cost += std::min(d, static_cast<double>(tolerance));
-      if (d > static_cast<double>(tolerance) || d >= nearest) continue;
+      evidence[m].cost += std::min(d, widest);
+      if (d > widest || d >= nearest) continue;
       nearest = d;
       labels[i] = static_cast<std::uint16_t>(m + 1);
     }

@@ -49,7 +49,7 @@ struct Evidence {
 void survey_points(const PointsView& points, Survey& survey);
 void weigh_points(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                   std::span<Evidence> evidence);
-void claim_points(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                  std::span<Evidence> evidence);
+void claim_points(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                  std::span<std::uint16_t> labels, std::span<Evidence> evidence);
 
 }  // namespace swarmfit::kernels

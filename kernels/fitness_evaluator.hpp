@@ -105,9 +105,9 @@ class FitnessEvaluator {
   virtual Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                          std::span<Evidence> evidence);
 
-  /// Labels as `assign` gives them, and what each model's own points say of it, each with weight 1.
-  virtual Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                         std::span<Evidence> evidence);
+  /// Labels as `assign` gives them, by one tolerance or one a point, and what each model's own points say of it, each with weight 1.
+  virtual Result<> claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                         std::span<std::uint16_t> labels, std::span<Evidence> evidence);
 };
 
 }  // namespace swarmfit::kernels

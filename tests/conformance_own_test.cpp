@@ -171,8 +171,8 @@ TEST_P(Own, DistancesLabelsAndEvidenceAreThoseOfTheBuiltInKind) {
         EXPECT_NEAR(evidence[m].moments.weight, truth[m].moments.weight, 1e-2 * truth[m].moments.weight + 20);
       }
     };
-    ASSERT_OK(own->claim(cloud.view(), tolerance, mine, labels.span(), evidence));
-    ASSERT_OK(reference().claim(cloud.view(), tolerance, theirs, right.span(), truth));
+    ASSERT_OK(own->claim(cloud.view(), {&tolerance, 1}, mine, labels.span(), evidence));
+    ASSERT_OK(reference().claim(cloud.view(), {&tolerance, 1}, theirs, right.span(), truth));
     agree();
     same_evidence();
     std::vector<float> told(9 * cloud.count());

@@ -24,10 +24,13 @@ double loss_of(const kernels::Evidence& evidence, Loss loss, std::span<const flo
 
 }  // namespace
 
+float widest_of(std::span<const float> allowed) noexcept {
+  return allowed.empty() ? 0.0F : *std::max_element(allowed.begin(), allowed.end());
+}
+
 kernels::Weighing Ground::weighing(std::span<const float> caps, float corner_of_tau) const {
   if (allowed.empty()) return {tau, corner_of_tau, caps};
   // Caps tell who is near enough; the tolerance is beyond them all, and the corner stays where it is.
-  const float widest = *std::max_element(allowed.begin(), allowed.end());
   return {widest, corner_of_tau * (tau / widest), caps.empty() ? allowed : caps};
 }
 

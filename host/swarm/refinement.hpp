@@ -11,6 +11,9 @@
 
 namespace swarmfit::swarm {
 
+/// The largest, or 0 where there is none.
+float widest_of(std::span<const float> allowed) noexcept;
+
 /// What refinement works on: all of `points`, or a part of them.
 struct Ground {
   kernels::FitnessEvaluator& evaluator;
@@ -20,9 +23,10 @@ struct Ground {
   const Subset* part = nullptr;
   float corner = 0.1F;                  ///< of tau: below this a residual weighs as in least squares, so that none weighs infinitely
   std::span<const float> allowed = {};  ///< tau of each of the ground's points [data unit]; empty: tau for all
+  float widest = widest_of(allowed);    ///< the largest of them
 
   /// The same for a model of another kind.
-  Ground of(const models::ModelSpace& other) const noexcept { return {evaluator, other, points, tau, part, corner, allowed}; }
+  Ground of(const models::ModelSpace& other) const noexcept { return {evaluator, other, points, tau, part, corner, allowed, widest}; }
   /// What the k-th point may be off.
   float allowed_at(std::size_t k) const noexcept { return allowed.empty() ? tau : allowed[k]; }
   /// Which points speak for a model, under `caps` or, where these are empty, under what the points may be off.

@@ -15,32 +15,6 @@ ModelRows rows_of(const Ground& ground, std::span<const models::Placed> models) 
   return rows;
 }
 
-/// Labels where each point has a threshold of its own: the nearest model within it; and what each model's own points say of it.
-Expected<> claim_by_allowance(const Ground& whole, std::span<const kernels::ModelView> models, std::span<std::uint16_t> labels,
-                              std::span<kernels::Evidence> evidence) {
-  std::vector<float> distances(labels.size()), least(labels.size(), std::numeric_limits<float>::infinity());
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    const auto done = whole.evaluator.weigh(whole.view(), whole.weighing({}, 1), models.subspan(m, 1), distances, evidence.subspan(m, 1));
-    if (!done) return tl::unexpected(to_error(done.error()));
-    for (std::size_t i = 0; i < labels.size(); ++i) {
-      if (!(distances[i] <= whole.allowed[i]) || !(distances[i] < least[i])) continue;
-      least[i] = distances[i];
-      labels[i] = static_cast<std::uint16_t>(m + 1);
-    }
-  }
-  std::vector<float> own(labels.size());
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    const double cost = evidence[m].cost;
-    // Under a cap of 0 a point has no say, unless it lies in the model to the last bit.
-    for (std::size_t i = 0; i < labels.size(); ++i) own[i] = labels[i] == m + 1 ? whole.allowed[i] : 0.0F;
-    const auto done = whole.evaluator.weigh(whole.view(), whole.weighing(own, 1), models.subspan(m, 1), {}, evidence.subspan(m, 1));
-    if (!done) return tl::unexpected(to_error(done.error()));
-    evidence[m].cost = cost;
-    evidence[m].count = static_cast<std::uint64_t>(std::count(labels.begin(), labels.end(), m + 1));
-  }
-  return {};
-}
-
 /// What the points that each model owns already say of it; its cost is of all points.
 Expected<> weigh_own(const Ground& whole, std::span<const kernels::ModelView> models, std::span<const std::uint16_t> labels,
                      std::span<kernels::Evidence> evidence) {
@@ -144,9 +118,8 @@ Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found,
   std::vector<kernels::Evidence> evidence(found.size());
   if (result.labels.empty()) {
     result.labels.resize(whole.points.size());
-    if (!whole.allowed.empty()) {
-      if (auto done = claim_by_allowance(whole, models.views(), result.labels, evidence); !done) return done;
-    } else if (auto done = whole.evaluator.claim(whole.view(), whole.tau, models.views(), result.labels, evidence); !done) {
+    const std::span<const float> tolerance = whole.allowed.empty() ? std::span<const float>(&whole.tau, 1) : whole.allowed;
+    if (auto done = whole.evaluator.claim(whole.view(), tolerance, models.views(), result.labels, evidence); !done) {
       return tl::unexpected(to_error(done.error()));
     }
   } else if (auto done = weigh_own(whole, models.views(), result.labels, evidence); !done) {

@@ -129,8 +129,8 @@ class CpuEvaluator final : public FitnessEvaluator {
                    [&] { run_in(crew_, worth_sharing(points.count), [&] { passes_.weigh(points, how, models, distances, evidence); }); });
   }
 
-  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                 std::span<Evidence> evidence) override {
+  Result<> claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                 std::span<std::uint16_t> labels, std::span<Evidence> evidence) override {
     if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
     return guarded(points.count, [&] {
       run_in(crew_, worth_sharing(points.count), [&] { passes_.claim(points, tolerance, models, labels, evidence); });
@@ -202,7 +202,7 @@ Result<> FitnessEvaluator::weigh(const PointsView& points, const Weighing& how, 
   return pass_on_cpu(points.count, [&](PointPasses& passes) { passes.weigh(points, how, models, distances, evidence); });
 }
 
-Result<> FitnessEvaluator::claim(const PointsView& points, float tolerance, std::span<const ModelView> models,
+Result<> FitnessEvaluator::claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
                                  std::span<std::uint16_t> labels, std::span<Evidence> evidence) {
   if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
   return pass_on_cpu(points.count, [&](PointPasses& passes) { passes.claim(points, tolerance, models, labels, evidence); });

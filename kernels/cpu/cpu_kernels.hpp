@@ -131,8 +131,8 @@ struct CpuKernels {
   void (*weigh)(ModelKind kind, const Strip& strip, const float* coefficients, float tolerance, float corner, StripSums& sums,
                 float* distances);
 
-  /// Before models claim a strip's points: nearest[i] = `beyond` for those that are finite and -1 for others, labels[i] = 0.
-  void (*begin_claim)(const Strip& strip, float beyond, float* nearest, std::int32_t* labels);
+  /// Before models claim a strip's points: nearest[i] is just beyond the limit of those that are finite and -1 for others, labels[i] = 0.
+  void (*begin_claim)(const Strip& strip, float* nearest, std::int32_t* labels);
 
   /// Where the distance is less than nearest[i]: nearest[i] is that, labels[i] = label. Adds to the cost; true if there was any such point.
   bool (*claim)(ModelKind kind, const Strip& strip, const float* coefficients, std::int32_t label, float* nearest, std::int32_t* labels,

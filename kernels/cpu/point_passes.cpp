@@ -295,19 +295,19 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
   add_up(runs, evidence);
 }
 
-void PointPasses::claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                        std::span<Evidence> evidence) {
+void PointPasses::claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                        std::span<std::uint16_t> labels, std::span<Evidence> evidence) {
   const std::size_t runs = run_count(points);
-  const float beyond = std::nextafter(tolerance, std::numeric_limits<float>::infinity());
+  const std::span<const float> each = tolerance.size() > 1 ? tolerance : std::span<const float>();
   evidence_.assign(runs * models.size(), {});
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    if (!bench.load(kernels_, points, strip, tolerance)) {
+    if (!bench.load(kernels_, points, strip, tolerance[0], each)) {
       std::fill_n(labels.begin() + static_cast<std::ptrdiff_t>(bench.first), bench.count, std::uint16_t{0});
       return;
     }
     alignas(64) std::array<float, kStripPoints> nearest, told;
     alignas(64) std::array<std::int32_t, kStripPoints> label;
-    kernels_.begin_claim(bench.strip, beyond, nearest.data(), label.data());
+    kernels_.begin_claim(bench.strip, nearest.data(), label.data());
     bench.claimants.clear();
     const auto width = static_cast<std::size_t>(points.dimension);
     Evidence* const of_run = evidence_.data() + run * models.size();

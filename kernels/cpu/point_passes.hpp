@@ -19,7 +19,7 @@ class PointPasses {
   void survey(const PointsView& points, Survey& survey);
   void weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
              std::span<Evidence> evidence);
-  void claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
+  void claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
              std::span<Evidence> evidence);
 
  private:

@@ -165,12 +165,14 @@ void weigh(ModelKind kind, const Strip& strip, const float* coefficients, float 
   visit_model(kind, [&]<class Model>() HWY_ATTR { weigh_of<Model>(strip, coefficients, tolerance, corner, sums, distances); });
 }
 
-void begin_claim(const Strip& strip, float beyond, float* HWY_RESTRICT nearest, std::int32_t* HWY_RESTRICT labels) {
+void begin_claim(const Strip& strip, float* HWY_RESTRICT nearest, std::int32_t* HWY_RESTRICT labels) {
   const FloatTag d;
   const BitsTag bits;
   for (std::size_t i = 0; i < strip.count; i += lanes()) {
-    const auto there = hn::Ge(hn::Load(d, strip.limit.data() + i), hn::Zero(d));
-    hn::Store(hn::IfThenElse(there, hn::Set(d, beyond), hn::Set(d, -1.0F)), d, nearest + i);
+    const Vector limit = hn::Load(d, strip.limit.data() + i);
+    // The next float up is the next integer up, and infinity stays what it is.
+    const Vector beyond = hn::Min(hn::BitCast(d, hn::Add(hn::BitCast(bits, limit), hn::Set(bits, 1))), hn::Inf(d));
+    hn::Store(hn::IfThenElse(hn::Ge(limit, hn::Zero(d)), beyond, hn::Set(d, -1.0F)), d, nearest + i);
     hn::Store(hn::Zero(bits), bits, labels + i);
   }
 }

@@ -116,8 +116,8 @@ class OwnEvaluator final : public FitnessEvaluator {
     });
   }
 
-  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                 std::span<Evidence> evidence) override {
+  Result<> claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                 std::span<std::uint16_t> labels, std::span<Evidence> evidence) override {
     if (auto ok = check_claim(points, tolerance, models, labels, evidence, own_.get()); !ok) return ok;
     return cpu::guarded(points.count, [&] {
       run(points.count, [&](Sharing sharing) { claim_own(*own_, points, tolerance, models, labels, evidence, sharing); });

@@ -104,9 +104,8 @@ void weigh_own(const OwnModel& own, const PointsView& points, const Weighing& ho
   });
 }
 
-void claim_own(const OwnModel& own, const PointsView& points, float tolerance, std::span<const ModelView> models,
+void claim_own(const OwnModel& own, const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
                std::span<std::uint16_t> labels, std::span<Evidence> evidence, Sharing sharing) {
-  const auto widest = static_cast<double>(tolerance);
   const Measures measures(own, points, models);
   std::fill(labels.begin(), labels.end(), std::uint16_t{0});
   for_runs(measures, points, evidence, sharing, [&](Run& run, std::span<Evidence> parts) {
@@ -114,7 +113,7 @@ void claim_own(const OwnModel& own, const PointsView& points, float tolerance, s
     for (std::size_t m = 0; m < measures.all.size(); ++m) {
       measures.all[m](run.rows, run.distances);
       for (std::size_t k = 0; k < run.finite.size(); ++k) {
-        const double d = run.distances[k];
+        const double d = run.distances[k], widest = static_cast<double>(tolerance[tolerance.size() > 1 ? run.finite[k] : 0]);
         parts[m].cost += std::min(d, widest);
         if (d > widest || d >= nearest[k]) continue;
         nearest[k] = d;

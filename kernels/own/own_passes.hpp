@@ -15,7 +15,7 @@ enum class Sharing { serial, threads };
 // Arguments are valid (checks.hpp). Points are taken in runs of fixed length, whose sums are added up in a fixed order.
 void weigh_own(const OwnModel& own, const PointsView& points, const Weighing& how, std::span<const ModelView> models,
                std::span<float> distances, std::span<Evidence> evidence, Sharing sharing);
-void claim_own(const OwnModel& own, const PointsView& points, float tolerance, std::span<const ModelView> models,
+void claim_own(const OwnModel& own, const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
                std::span<std::uint16_t> labels, std::span<Evidence> evidence, Sharing sharing);
 
 }  // namespace swarmfit::kernels

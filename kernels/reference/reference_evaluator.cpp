@@ -100,8 +100,8 @@ class ReferenceEvaluator final : public FitnessEvaluator {
     return {};
   }
 
-  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                 std::span<Evidence> evidence) override {
+  Result<> claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                 std::span<std::uint16_t> labels, std::span<Evidence> evidence) override {
     if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
     claim_points(points, tolerance, models, labels, evidence);
     return {};

@@ -46,8 +46,8 @@ class VulkanEvaluator final : public FitnessEvaluator {
   Effort effort() const noexcept override { return effort_; }
   Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                  std::span<Evidence> evidence) override;
-  Result<> claim(const PointsView& points, float tolerance, std::span<const ModelView> models, std::span<std::uint16_t> labels,
-                 std::span<Evidence> evidence) override;
+  Result<> claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
+                 std::span<std::uint16_t> labels, std::span<Evidence> evidence) override;
 
  private:
   ModelTraits traits_of(ModelKind kind) const noexcept { return own_ ? own_->traits() : traits(kind); }
@@ -252,7 +252,7 @@ Result<> VulkanEvaluator::weigh(const PointsView& points, const Weighing& how, s
   });
 }
 
-Result<> VulkanEvaluator::claim(const PointsView& points, float tolerance, std::span<const ModelView> models,
+Result<> VulkanEvaluator::claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
                                 std::span<std::uint16_t> labels, std::span<Evidence> evidence) {
   if (!own_) return FitnessEvaluator::claim(points, tolerance, models, labels, evidence);
   if (auto ok = check_claim(points, tolerance, models, labels, evidence, own_.get()); !ok) return ok;
