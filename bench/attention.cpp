@@ -12,12 +12,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <swarmfit/perception.hpp>
+#include <swarmfit/results.hpp>
 #include <swarmfit/scene.hpp>
 
+#include "host/io/png.hpp"
 #include "host/perception/gallery_pictures.hpp"
 #include "host/perception/recognition.hpp"
 
@@ -57,13 +58,11 @@ struct Entry {
 std::vector<Entry> fill_gallery(const fs::path& folder, const Scene& scene, std::uint64_t seed, int strangers) {
   std::vector<Entry> entries;
   const auto add = [&](const ScenePicture& picture, const std::string& name, std::uint16_t object) {
-    cv::Mat bgr;
-    cv::cvtColor(cv::Mat(picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.rgb.data())), bgr, cv::COLOR_RGB2BGR);
+    const cv::Mat rgb(picture.height, picture.width, CV_8UC3, const_cast<std::uint8_t*>(picture.rgb.data()));  // only read
     const fs::path file = folder / (name + ".png");
-    cv::imwrite(file.string(), bgr);
-    const auto bytes = perception::read_picture(file);
-    if (!bytes) return;
-    if (auto features = perception::picture_features(file, *bytes)) entries.push_back({name, object, std::move(*features)});
+    const std::string bytes = io::encode_png(rgb);
+    if (!write_text(file, bytes)) return;
+    if (auto features = perception::picture_features(file, bytes)) entries.push_back({name, object, std::move(*features)});
   };
   for (const ScenePicture& picture : scene.pictures) add(picture, picture.name, picture.object);
   int left = strangers;

@@ -1,5 +1,5 @@
 # What the library is made of; tools/setup.sh installs all of it from Debian. swarmfitConfig.cmake.in asks for the same packages.
-set(SWARMFIT_OPENCV_COMPONENTS core imgproc imgcodecs calib3d features2d flann video)
+set(SWARMFIT_OPENCV_COMPONENTS core imgproc calib3d features2d flann video)
 
 find_package(Threads REQUIRED)
 find_package(Eigen3 REQUIRED NO_MODULE)
@@ -27,5 +27,7 @@ if(SWARMFIT_VULKAN)
     message(STATUS "Models that users bring along will not run on Vulkan: glslang's library was not found (glslang-dev)")
   endif()
 endif()
+
+include(SwarmfitImageFiles)
 
 list(TRANSFORM SWARMFIT_OPENCV_COMPONENTS PREPEND opencv_ OUTPUT_VARIABLE SWARMFIT_OPENCV_TARGETS)

@@ -25,7 +25,8 @@ install(EXPORT swarmfitTargets NAMESPACE swarmfit:: DESTINATION ${package_dir})
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/swarmfitConfig.cmake.in ${PROJECT_BINARY_DIR}/swarmfitConfig.cmake
   INSTALL_DESTINATION ${package_dir})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/swarmfitConfigVersion.cmake COMPATIBILITY SameMinorVersion)
-install(FILES ${PROJECT_BINARY_DIR}/swarmfitConfig.cmake ${PROJECT_BINARY_DIR}/swarmfitConfigVersion.cmake DESTINATION ${package_dir})
+install(FILES ${PROJECT_BINARY_DIR}/swarmfitConfig.cmake ${PROJECT_BINARY_DIR}/swarmfitConfigVersion.cmake
+              ${CMAKE_CURRENT_LIST_DIR}/SwarmfitImageFiles.cmake DESTINATION ${package_dir})
 
 # pkg-config: who links a static library links what is inside it, too.
 file(RELATIVE_PATH SWARMFIT_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
@@ -35,7 +36,7 @@ if(SWARMFIT_GLSLANG_TARGETS)
   set(glslang " -lSPIRV -lglslang -lMachineIndependent -lOSDependent -lOGLCompiler -lGenericCodeGen"
               " -lglslang-default-resource-limits -lSPIRV-Tools-opt -lSPIRV-Tools")
 endif()
-string(JOIN "" inside " -lfmt -ltbb -lhwy -llzf" ${inside} ${glslang} " -ldl -lpthread -lstdc++ -lm")
+string(JOIN "" inside " -lfmt -ltbb -lhwy -llzf -lspng -lturbojpeg" ${inside} ${glslang} " -ldl -lpthread -lstdc++ -lm")
 if(BUILD_SHARED_LIBS)
   set(SWARMFIT_PC_LIBS)
   set(SWARMFIT_PC_LIBS_PRIVATE "${inside}")

@@ -105,8 +105,8 @@ TiltedPair tilted_pair(double turn, double down) {
 TEST(Stereo, RowsThatDoNotMeetAreMeasured) {
   const auto pair = tilted_pair(0.002, 0.4);
   cv::Mat left, right;
-  cv::cvtColor(pair.left, left, cv::COLOR_BGR2GRAY);
-  cv::cvtColor(pair.right, right, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(pair.left, left, cv::COLOR_RGB2GRAY);
+  cv::cvtColor(pair.right, right, cv::COLOR_RGB2GRAY);
   const auto shift = io::row_shift(left, right, 32);
   ASSERT_TRUE(shift);
   EXPECT_NEAR((*shift)[0], 0.4, 0.03);
@@ -121,8 +121,8 @@ TEST(Stereo, LevelRowsAreLeftAloneAndOthersBroughtLevel) {
   const auto tilted = tilted_pair(0.002, 0.4);
   const cv::Mat level = io::level_rows(tilted.left, tilted.right, 32);
   cv::Mat grey, left;
-  cv::cvtColor(level, grey, cv::COLOR_BGR2GRAY);
-  cv::cvtColor(tilted.left, left, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(level, grey, cv::COLOR_RGB2GRAY);
+  cv::cvtColor(tilted.left, left, cv::COLOR_RGB2GRAY);
   const auto rest = io::row_shift(left, grey, 32);
   ASSERT_TRUE(rest);
   EXPECT_NEAR((*rest)[0], 0, 0.03);
@@ -166,7 +166,9 @@ TEST_P(StereoRealData, AgreesWithTheTrueDisparities) {
   const cv::Mat truth = read_pfm(folder / "disp0GT.pfm");
   ASSERT_FALSE(truth.empty());
   const cv::Mat mask = cv::imread((folder / "mask0nocc.png").string(), cv::IMREAD_GRAYSCALE);
-  const cv::Mat left = cv::imread((folder / "im0.png").string()), right = cv::imread((folder / "im1.png").string());
+  cv::Mat left = cv::imread((folder / "im0.png").string()), right = cv::imread((folder / "im1.png").string());
+  cv::cvtColor(left, left, cv::COLOR_BGR2RGB);
+  cv::cvtColor(right, right, cv::COLOR_BGR2RGB);
   const cv::Mat d = io::disparity_map(left, io::level_rows(left, right, 80), 80);
   const Errors e = errors(d, truth, mask);
   RecordProperty("density", std::to_string(e.density));

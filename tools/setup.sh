@@ -11,14 +11,14 @@ packages=(
   # libraries
   libhwy-dev libtbb-dev libeigen3-dev librandom123-dev libexpected-dev libcli11-dev nlohmann-json3-dev libfmt-dev liblzf-dev
   libnanoflann-dev
-  libopencv-dev
+  libopencv-dev libspng-dev libturbojpeg0-dev
   # tests and benchmarks
   libgtest-dev libbenchmark-dev
   # the Python package; nanobind comes from pip
   python3-dev python3-venv
   # the documentation's site reads the headers with it; the rest of it comes from pip
   doxygen
-  # the installed pkg-config file
+  # finds libraries that have no CMake package, and reads the installed pkg-config file
   pkgconf
   # the Motorcycle stereo pair
   python3-skimage

@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <swarmfit/figures.hpp>
 
+#include "host/io/jpeg.hpp"
 #include "host/io/palette.hpp"
 #include "host/perception/boundary.hpp"
 #include "host/perception/segmentation_grid.hpp"
@@ -27,7 +27,7 @@ using perception::SoiRegion;
 constexpr int kPanelWidth = 480;  // [px]
 constexpr int kCaption = 20;      // [px] height of the line below a panel
 
-/// What all panels are drawn from. Pictures are in OpenCV's order of colours.
+/// What all panels are drawn from. Pictures are RGB.
 struct Stages {
   const PerceiveResult& result;
   SegmentationInput input;
@@ -36,7 +36,7 @@ struct Stages {
   cv::Mat3b photo;
 };
 
-cv::Vec3b bgr(const io::Rgb& colour) { return {colour[2], colour[1], colour[0]}; }
+cv::Vec3b rgb(const io::Rgb& colour) { return {colour[0], colour[1], colour[2]}; }
 cv::Vec3b mixed(const cv::Vec3b& a, const cv::Vec3b& b, double share) {
   cv::Vec3b out;
   for (int c = 0; c < 3; ++c) out[c] = cv::saturate_cast<std::uint8_t>(a[c] * (1 - share) + b[c] * share);
@@ -51,9 +51,9 @@ cv::Mat3b tinted(const cv::Mat3b& ground, const std::vector<std::uint16_t>& labe
     for (int u = 0; u < out.cols; ++u) {
       const std::size_t k = labels[static_cast<std::size_t>(v * out.cols + u)];
       if (k == kUncertain)
-        out(v, u) = mixed(out(v, u), bgr(io::kUnlabelled), 0.9);
+        out(v, u) = mixed(out(v, u), rgb(io::kUnlabelled), 0.9);
       else if (k > 0)
-        out(v, u) = mixed(out(v, u), bgr(io::plane_colour(k)), share);
+        out(v, u) = mixed(out(v, u), rgb(io::plane_colour(k)), share);
     }
   return out;
 }
@@ -64,9 +64,9 @@ cv::Mat3b planes(const Stages& s) {
     for (int u = 0; u < out.cols; ++u) {
       const std::size_t i = s.grid.index(u, v), plane = s.result.fit.labels[i];
       if (s.result.popout[i] != 0)
-        out(v, u) = mixed(out(v, u), bgr(io::kStickingOut), 0.65);
+        out(v, u) = mixed(out(v, u), rgb(io::kStickingOut), 0.65);
       else if (plane != 0)
-        out(v, u) = mixed(out(v, u), bgr(io::plane_colour(plane)), s.result.fit.models[plane - 1].supporting ? 0.6 : 0.25);
+        out(v, u) = mixed(out(v, u), rgb(io::plane_colour(plane)), s.result.fit.models[plane - 1].supporting ? 0.6 : 0.25);
     }
   return out;
 }
@@ -74,7 +74,7 @@ cv::Mat3b planes(const Stages& s) {
 cv::Mat3b spaces(const Stages& s) {
   cv::Mat3b out = s.photo.clone();
   for (const SoiRegion& region : s.regions)
-    if (region.label != 0) cv::rectangle(out, region.rect, cv::Scalar(0, 221, 255), std::max(1, out.cols / 400));
+    if (region.label != 0) cv::rectangle(out, region.rect, cv::Scalar(255, 221, 0), std::max(1, out.cols / 400));
   return out;
 }
 
@@ -102,11 +102,11 @@ cv::Mat3b borders(const Stages& s) {
   cv::Mat1b grey;
   perception::boundary_probability(s.input.frame).convertTo(grey, CV_8U, 255);
   cv::Mat3b out;
-  cv::cvtColor(grey, out, cv::COLOR_GRAY2BGR);
+  cv::cvtColor(grey, out, cv::COLOR_GRAY2RGB);
   for (const SoiRegion& region : s.regions)
     if (region.label != 0)
       for (const auto& fixation : perception::find_fixations(s.input, s.grid, region))
-        cv::drawMarker(out, fixation.at, cv::Scalar(0, 221, 255), cv::MARKER_CROSS, out.cols / 45, std::max(1, out.cols / 320));
+        cv::drawMarker(out, fixation.at, cv::Scalar(255, 221, 0), cv::MARKER_CROSS, out.cols / 45, std::max(1, out.cols / 320));
   return out;
 }
 
@@ -129,10 +129,8 @@ Figure figure(std::string name, std::string shows, const std::vector<std::pair<c
   }
   cv::Mat sheet;
   cv::vconcat(rows, sheet);
-  std::vector<std::uint8_t> bytes;
   constexpr int kQuality = 80;
-  cv::imencode(".jpg", sheet, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-  return {std::move(name), std::move(shows), {bytes.begin(), bytes.end()}};
+  return {std::move(name), std::move(shows), io::encode_jpeg(sheet, kQuality)};
 }
 
 std::vector<std::uint16_t> outlines(const SegmentationInput& input, PerceiveOptions options, Preset preset, Segmentation segmentation) {
@@ -172,7 +170,7 @@ Expected<std::vector<Figure>> perception_figures(const Cloud& frame, const Perce
   if (!result) return tl::unexpected(result.error());
   Stages stages{*result, {frame, result->fit.labels, result->popout, result->sois}, PixelGrid(frame), {}, {}};
   stages.regions = perception::soi_regions(stages.input, stages.grid, options.soi_margin, 2, options.fit.threads);
-  cv::cvtColor(cv::Mat(frame.height, frame.width, CV_8UC3, const_cast<std::uint8_t*>(frame.rgb.data())), stages.photo, cv::COLOR_RGB2BGR);
+  stages.photo = cv::Mat3b(frame.height, frame.width, reinterpret_cast<cv::Vec3b*>(const_cast<std::uint8_t*>(frame.rgb.data())));
   return draw(stages, options);
 }
 

@@ -123,7 +123,7 @@ Expected<Cloud> read_rgbd(const std::filesystem::path& color, const std::filesys
       return io::bad_input(color, "is {} x {} pixels, must be {} x {} as {}", image->cols, image->rows, cloud->width, cloud->height,
                            depth.string());
     }
-    io::take_colours(*image, false, *cloud);
+    io::take_colours(*image, true, *cloud);
     return cloud;
   });
 }

@@ -88,8 +88,8 @@ std::optional<Eigen::Vector3d> row_shift(const cv::Mat& left, const cv::Mat& rig
 
 cv::Mat level_rows(const cv::Mat& left, const cv::Mat& right, int disparities) {
   cv::Mat grey_left, grey_right;
-  cv::cvtColor(left, grey_left, cv::COLOR_BGR2GRAY);
-  cv::cvtColor(right, grey_right, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(left, grey_left, cv::COLOR_RGB2GRAY);
+  cv::cvtColor(right, grey_right, cv::COLOR_RGB2GRAY);
   const auto shift = row_shift(grey_left, grey_right, disparities);
   if (!shift) return right;
   const auto at = [&](double u, double v) { return shift->dot(terms(u, v, right.size())); };

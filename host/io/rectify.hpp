@@ -14,8 +14,8 @@ namespace swarmfit::io {
 /// [0, `disparities`).
 std::optional<Eigen::Vector3d> row_shift(const cv::Mat& left, const cv::Mat& right, int disparities);
 
-/// The right image with its rows brought to the left's; itself where the shift is below what matching notices. left, right: CV_8UC3 of
-/// one size.
+/// The right image with its rows brought to the left's; itself where the shift is below what matching notices. left, right: CV_8UC3, RGB,
+/// of one size.
 cv::Mat level_rows(const cv::Mat& left, const cv::Mat& right, int disparities);
 
 }  // namespace swarmfit::io

@@ -21,7 +21,7 @@ cv::Mat disparity_map(const cv::Mat& left, const cv::Mat& right, int disparities
   // Grey finds more than colour, in half the time. SGBM leaves out the first `range` columns; a replicated border brings them in.
   const auto widened = [range](const cv::Mat& image) {
     cv::Mat grey, wide;
-    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(image, grey, cv::COLOR_RGB2GRAY);
     cv::copyMakeBorder(grey, wide, 0, 0, range, 0, cv::BORDER_REPLICATE);
     return wide;
   };
@@ -74,7 +74,7 @@ Expected<Cloud> stereo_cloud(const std::filesystem::path& left_file, const std::
   }
   Cloud cloud;
   back_project(z, calib->left, cloud);
-  take_colours(*left, false, cloud);
+  take_colours(*left, true, cloud);
   cloud.passive_stereo = true;
   return cloud;
 }

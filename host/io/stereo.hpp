@@ -6,7 +6,7 @@
 namespace swarmfit::io {
 
 /// Disparities d of the left image [px], CV_32F, NaN where not known: left (u, v) is seen at right (u - d, v), 0 <= d < `disparities`.
-/// left, right: CV_8UC3 of one size.
+/// left, right: CV_8UC3, RGB, of one size.
 cv::Mat disparity_map(const cv::Mat& left, const cv::Mat& right, int disparities);
 
 }  // namespace swarmfit::io

@@ -9,13 +9,12 @@
 #include <unistd.h>
 
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include <swarmfit/results.hpp>
 
 #include "host/io/file.hpp"
 #include "host/io/palette.hpp"
+#include "host/io/png.hpp"
 
 namespace swarmfit {
 namespace {
@@ -34,24 +33,16 @@ Expected<> write_whole(const fs::path& file, std::string_view bytes) {
   });
 }
 
-std::string png(const cv::Mat& image) {
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", image, bytes);
-  return {bytes.begin(), bytes.end()};
-}
-
 /// 16 bits a pixel; all 0 where the stage that would have labelled it was left out.
 std::string label_image(const std::vector<std::uint16_t>& labels, const Cloud& input) {
   cv::Mat image = cv::Mat::zeros(input.height, input.width, CV_16U);
   if (labels.size() == input.size()) std::memcpy(image.data, labels.data(), labels.size() * sizeof(std::uint16_t));
-  return png(image);
+  return io::encode_png(image);
 }
 
 std::string overlay_image(const PerceiveResult& result, const Cloud& input) {
   std::vector<std::uint8_t> rgb = render_overlay(result, input);
-  cv::Mat image(input.height, input.width, CV_8UC3, rgb.data());
-  cv::cvtColor(image, image, cv::COLOR_RGB2BGR);
-  return png(image);
+  return io::encode_png(cv::Mat(input.height, input.width, CV_8UC3, rgb.data()));
 }
 
 template <class T>

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <swarmfit/results.hpp>
 
+#include "host/io/png.hpp"
 #include "host/perception/gallery_index.hpp"
 #include "host/perception/gallery_pictures.hpp"
 
@@ -112,12 +112,9 @@ Expected<LearntView> learn_object(const fs::path& gallery, const std::string& na
   cv::Rect box = cv::boundingRect(*mask);
   const cv::Point border(perception::kBorder, perception::kBorder);
   box = cv::Rect(box.tl() - border, box.br() + border) & cv::Rect({}, mask->size());
-  cv::Mat bgr, picture;
-  cv::cvtColor(rgb(box), bgr, cv::COLOR_RGB2BGR);
-  cv::merge(std::vector<cv::Mat>{bgr, (*mask)(box)}, picture);
-  std::vector<unsigned char> bytes;
-  cv::imencode(".png", picture, bytes);
-  return add_view(gallery, name, {bytes.begin(), bytes.end()}, ".png", fmt::format("object {}", object));
+  cv::Mat picture;
+  cv::merge(std::vector<cv::Mat>{rgb(box), (*mask)(box)}, picture);
+  return add_view(gallery, name, io::encode_png(picture), ".png", fmt::format("object {}", object));
 }
 
 }  // namespace swarmfit

@@ -9,8 +9,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "host/io/image.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -40,6 +41,7 @@ Expected<std::vector<fs::path>> entries(const fs::path& folder) {
 bool is_image(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  // Also what cannot be read here: a gallery's picture is an error then, and not passed over.
   static constexpr std::array<std::string_view, 9> known = {".png", ".jpg", ".jpeg", ".bmp", ".ppm", ".pgm", ".tif", ".tiff", ".webp"};
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
@@ -67,7 +69,6 @@ Expected<std::vector<GalleryPicture>> list_pictures(const fs::path& folder) {
 }
 
 Expected<std::string> read_picture(const fs::path& file) {
-  // Decoded from memory: imread reports to stderr what it cannot open.
   std::ifstream stream(file, std::ios::binary);
   std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   if (bytes.empty()) return fail(Error::Kind::bad_input, fmt::format("gallery image {}: cannot be read", file.string()));
@@ -75,29 +76,18 @@ Expected<std::string> read_picture(const fs::path& file) {
 }
 
 Expected<Features> picture_features(const fs::path& file, std::string_view bytes) {
-  cv::Mat image;
-  try {
-    // OpenCV only reads.
-    const cv::Mat1b raw(1, static_cast<int>(bytes.size()), reinterpret_cast<std::uint8_t*>(const_cast<char*>(bytes.data())));
-    if (!bytes.empty()) image = cv::imdecode(raw, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) return fail(Error::Kind::bad_input, fmt::format("gallery image {}: cannot be read", file.string()));
-  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257);
-  if (image.depth() != CV_8U)
-    return fail(Error::Kind::bad_input, fmt::format("gallery image {}: neither 8 nor 16 bits a channel", file.string()));
+  const auto decoded = io::decode_image(file, bytes, true);
+  if (!decoded) return fail(decoded.error().kind, "gallery image " + decoded.error().message);
+  cv::Mat image = *decoded;
   const int longest = std::max(image.rows, image.cols);
   if (longest > kLargestView) cv::resize(image, image, {}, 1.0 * kLargestView / longest, 1.0 * kLargestView / longest, cv::INTER_AREA);
   cv::Mat1b grey, mask;
   if (image.channels() == 4) {
     cv::extractChannel(image, mask, 3);
     mask = mask > 127;
-    cv::cvtColor(image, grey, cv::COLOR_BGRA2GRAY);
-  } else if (image.channels() == 3) {
-    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(image, grey, cv::COLOR_RGBA2GRAY);
   } else {
-    cv::extractChannel(image, grey, 0);
+    cv::cvtColor(image, grey, cv::COLOR_RGB2GRAY);
   }
   if (mask.empty()) mask = cv::Mat1b(grey.size(), 255);
   look_closer(grey, mask);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <new>
 #include <string>
 #include <string_view>
@@ -9,7 +10,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <swarmfit/report.hpp>
@@ -17,7 +17,9 @@
 #include <swarmfit/version.hpp>
 
 #include "host/io/ground_image.hpp"
+#include "host/io/jpeg.hpp"
 #include "host/io/palette.hpp"
+#include "host/io/png.hpp"
 #include "host/report/cost_maps.hpp"
 #include "host/report/encode.hpp"
 #include "host/report/search_json.hpp"
@@ -94,24 +96,21 @@ std::vector<std::uint16_t> coarser(const std::vector<std::uint16_t>& labels, con
   return some;
 }
 
+Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
+
 /// One in `every` pixels and rows, without loss.
 Bytes png(const cv::Mat1b& levels, int every, cv::Size size) {
   cv::Mat shown = levels;
   if (every > 1) cv::resize(levels, shown, size, 0, 0, cv::INTER_NEAREST);
-  Bytes bytes;
-  cv::imencode(".png", shown, bytes, {cv::IMWRITE_PNG_COMPRESSION, 9});
-  return bytes;
+  return bytes_of(io::encode_png(shown, io::PngEffort::small));
 }
 
 json add_image(Parts& parts, const Cloud& input, const std::vector<std::uint16_t>& planes, const PerceiveResult* perceived) {
   const int every = (input.width + kWidestImage - 1) / kWidestImage;
   const int width = (input.width + every - 1) / every, height = (input.height + every - 1) / every;
-  cv::Mat image;
-  cv::cvtColor(io::ground_image(input), image, cv::COLOR_RGB2BGR);
+  cv::Mat image = io::ground_image(input);
   if (every > 1) cv::resize(image, image, {width, height}, 0, 0, cv::INTER_AREA);
-  Bytes jpeg;
-  cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
-  parts.add("image-jpeg", jpeg);
+  parts.add("image-jpeg", bytes_of(io::encode_jpeg(image, kJpegQuality)));
   parts.add("image-planes", report::runs(coarser(planes, input, every)));
   if (perceived != nullptr) {
     parts.add("image-popout", report::runs(coarser(perceived->popout, input, every)));
@@ -192,8 +191,8 @@ Expected<std::string> make_page(const std::string& result, const FitResult& fit,
 #endif
 } catch (const std::bad_alloc&) {
   return fail(Error::Kind::out_of_memory, fmt::format("no memory for a page of {} points", input.size()));
-} catch (const cv::Exception& e) {
-  return fail(Error::Kind::cannot_write, fmt::format("the page's image: {}", e.err));
+} catch (const std::exception& e) {
+  return fail(Error::Kind::cannot_write, fmt::format("the page's image: {}", e.what()));
 }
 
 }  // namespace
