@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "kernels/gpu_nodes.hpp"
+
 namespace swarmfit::kernels {
 namespace {
 
@@ -32,6 +34,8 @@ Result<std::unique_ptr<FitnessEvaluator>> make_reference(const EvaluatorOptions&
 Result<Selection> choose_automatically(const EvaluatorOptions& options) {
   if (options.own && options.own->glsl.empty()) return selected(make_cpu(options), "auto: the own model has no GLSL");
   // Asking every driver takes tens of milliseconds, and a process may make many evaluators; what is plugged in later is taken by name.
+  static const bool may_be_there = may_have_gpu();
+  if (!may_be_there) return selected(make_cpu(options), "auto: no GPU in /dev");
   static const std::vector<DeviceDescription> devices = vulkan_devices();
   std::string why = "no GPU with Vulkan here";
   for (const DeviceDescription& device : devices) {
