@@ -4,46 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <utility>
-
-#include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels {
-namespace {
-
-constexpr int kDigitBits = 8;
-constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
-constexpr int kPasses = 3;
-constexpr std::size_t kLeastChunk = 16384;
-constexpr std::size_t kMostChunks = 64;
-constexpr std::size_t kSample = 1024;
-
-/// Where most of a column lies: from its 2nd to its 98th percentile, by a sample, and a quarter more on both sides. Strays do not count.
-std::pair<float, float> bulk(const float* column, std::size_t count) {
-  std::vector<float> sample;
-  const std::size_t stride = count / kSample + 1;
-  for (std::size_t i = 0; i < count; i += stride) sample.push_back(column[i]);
-  std::sort(sample.begin(), sample.end());
-  const float low = sample[sample.size() / 50], high = sample[sample.size() - 1 - sample.size() / 50];
-  const float margin = (high - low) / 4;
-  return {low - margin, high + margin};
-}
-
-/// Bits of v spread out so that `gap` zero bits follow each.
-std::uint32_t spread_bits(std::uint32_t v, int gap, int bits) {
-  std::uint32_t out = 0;
-  for (int b = 0; b < bits; ++b) out |= ((v >> b) & 1U) << (b * (gap + 1));
-  return out;
-}
-
-/// spread_bits for every cell number of an axis.
-std::vector<std::uint32_t> spread_table(int dimensions, int bits) {
-  std::vector<std::uint32_t> table(std::size_t{1} << bits);
-  for (std::size_t v = 0; v < table.size(); ++v) table[v] = spread_bits(static_cast<std::uint32_t>(v), dimensions - 1, bits);
-  return table;
-}
-
-}  // namespace
 
 void principal_axes(std::array<std::array<double, 3>, 3>& matrix, std::array<std::array<double, 3>, 3>& axes, int dimension) {
   // Jacobi rotations.
@@ -74,68 +36,6 @@ void principal_axes(std::array<std::array<double, 3>, 3>& matrix, std::array<std
       }
     }
   }
-}
-
-std::span<const std::uint32_t> MortonOrder::sort(std::span<const float* const> columns, std::size_t count) {
-  const std::size_t dimensions = columns.size();
-  const std::size_t chunk_rows = std::max(kLeastChunk, (count + kMostChunks - 1) / kMostChunks);
-  const std::size_t chunks = (count + chunk_rows - 1) / chunk_rows;
-  const auto for_chunks = [&](auto&& body) {
-    cpu::for_each_task(chunks, [&](std::size_t chunk) { body(chunk, chunk * chunk_rows, std::min(count, (chunk + 1) * chunk_rows)); });
-  };
-
-  std::array<float, 3> low{};
-  double widest = 0;
-  for (std::size_t c = 0; c < dimensions; ++c) {
-    const auto [from, to] = bulk(columns[c], count);
-    low[c] = from;
-    widest = std::max(widest, static_cast<double>(to) - static_cast<double>(from));
-  }
-
-  // Cells are cubes; the digits together hold the key of a cell.
-  const int bits = kPasses * kDigitBits / static_cast<int>(dimensions);
-  const double cells = static_cast<double>((std::size_t{1} << bits) - 1);
-  const auto scale = static_cast<float>(widest > 0 ? cells / widest : 0.0);
-  const std::vector<std::uint32_t> spread = spread_table(static_cast<int>(dimensions), bits);
-  entries_.resize(count);
-  scratch_.resize(count);
-  order_.resize(count);
-  for_chunks([&](std::size_t, std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) {
-      std::uint32_t key = 0;
-      for (std::size_t c = 0; c < dimensions; ++c) {
-        const float cell = (columns[c][i] - low[c]) * scale;
-        key |= spread[static_cast<std::size_t>(std::clamp(cell, 0.0F, static_cast<float>(cells)))] << c;
-      }
-      entries_[i] = (std::uint64_t{key} << 32) | i;
-    }
-  });
-
-  for (int pass = 0; pass < kPasses; ++pass) {
-    const int shift = 32 + pass * kDigitBits;
-    histogram_.assign(chunks * kDigits, 0);
-    for_chunks([&](std::size_t chunk, std::size_t first, std::size_t last) {
-      std::uint32_t* counts = histogram_.data() + chunk * kDigits;
-      for (std::size_t i = first; i < last; ++i) ++counts[(entries_[i] >> shift) % kDigits];
-    });
-    std::uint32_t at = 0;
-    for (std::size_t digit = 0; digit < kDigits; ++digit) {
-      for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
-        const std::uint32_t here = histogram_[chunk * kDigits + digit];
-        histogram_[chunk * kDigits + digit] = at;
-        at += here;
-      }
-    }
-    for_chunks([&](std::size_t chunk, std::size_t first, std::size_t last) {
-      std::uint32_t* starts = histogram_.data() + chunk * kDigits;
-      for (std::size_t i = first; i < last; ++i) scratch_[starts[(entries_[i] >> shift) % kDigits]++] = entries_[i];
-    });
-    entries_.swap(scratch_);
-  }
-  for_chunks([&](std::size_t, std::size_t first, std::size_t last) {
-    for (std::size_t i = first; i < last; ++i) order_[i] = static_cast<std::uint32_t>(entries_[i]);
-  });
-  return order_;
 }
 
 namespace {

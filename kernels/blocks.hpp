@@ -3,10 +3,7 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
-#include <span>
-#include <vector>
 
 #include "kernels/models/models.hpp"
 
@@ -14,17 +11,6 @@ namespace swarmfit::kernels {
 
 /// Points of a block. The last one of a cloud is padded.
 inline constexpr std::size_t kBlockPoints = 256;
-
-/// Positions in Morton order: neighbours in the list are neighbours in space. `columns` hold `count` finite coordinates each, 2 or 3 of
-/// them. A stable parallel radix sort over cells; points far from where most are share the outermost cells. Works in the caller's crew.
-class MortonOrder {
- public:
-  std::span<const std::uint32_t> sort(std::span<const float* const> columns, std::size_t count);
-
- private:
-  std::vector<std::uint64_t> entries_, scratch_;  // key in the upper half, position in the lower
-  std::vector<std::uint32_t> histogram_, order_;
-};
 
 /// The box of a block and sums from which costs are bounded, over the points whose cap is not 0; everything in float, with room left for
 /// its rounding by the user. Axes are the principal ones, so that a patch of a plane has a flat box.

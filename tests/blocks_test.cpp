@@ -14,6 +14,7 @@
 #include "kernels/blocks.hpp"
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/evaluators.hpp"
+#include "kernels/morton_order.hpp"
 
 namespace swarmfit::kernels {
 namespace {
@@ -273,7 +274,8 @@ TEST(MortonOrder, IsAPermutationOfNeighbours) {
     std::vector<const float*> starts;
     for (const auto& column : columns) starts.push_back(column.data());
     MortonOrder morton;
-    const auto order = morton.sort(starts, kCount);
+    std::vector<std::uint32_t> order;
+    morton.sort(starts, kCount, order);
     std::vector<std::uint32_t> sorted(order.begin(), order.end());
     std::sort(sorted.begin(), sorted.end());
     std::vector<std::uint32_t> all(kCount);
@@ -290,6 +292,40 @@ TEST(MortonOrder, IsAPermutationOfNeighbours) {
     };
     EXPECT_LT(length(order), (dimensions == 2 ? 0.1 : 0.2) * length(all));
   }
+}
+
+TEST(MortonOrder, LargeCloudsAreOrderedAsSmallOnesAre) {
+  // The same cells again and again: the large cloud's points of a cell must come in their order, cells as in the small cloud.
+  constexpr std::size_t kSmall = 40000, kTimes = 30;
+  std::mt19937 engine(6);
+  std::vector<std::vector<float>> small(3, std::vector<float>(kSmall)), large(3);
+  for (auto& column : small) {
+    for (float& v : column) v = static_cast<float>(engine() % 8);
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t k = 0; k < kTimes; ++k) large[c].insert(large[c].end(), small[c].begin(), small[c].end());
+  }
+  const auto sorted = [](const std::vector<std::vector<float>>& columns) {
+    std::vector<const float*> starts;
+    for (const auto& column : columns) starts.push_back(column.data());
+    std::vector<std::uint32_t> order;
+    MortonOrder().sort(starts, columns[0].size(), order);
+    return order;
+  };
+  const auto cell = [&](std::uint32_t i) { return std::array{large[0][i], large[1][i], large[2][i]}; };
+  const auto few = sorted(small), many = sorted(large);
+  std::vector<std::array<float, 3>> cells, again;
+  for (const std::uint32_t i : few) {
+    if (cells.empty() || cells.back() != cell(i)) cells.push_back(cell(i));
+  }
+  for (std::size_t k = 0; k < many.size(); ++k) {
+    if (k > 0 && again.back() == cell(many[k])) {
+      ASSERT_LT(many[k - 1], many[k]);
+    } else {
+      again.push_back(cell(many[k]));
+    }
+  }
+  EXPECT_EQ(again, cells);
 }
 
 TEST(BlockBounds, HoldEveryPointWithACap) {

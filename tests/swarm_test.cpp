@@ -288,7 +288,9 @@ TEST(Payment, TwoSurfacesSideBySidePayUnlessOneIsTheOthersLayer) {
   twin.beside = 100;
   EXPECT_FALSE(pays(twin, settings, 2)) << "beside what has been found";
   const std::vector<float> distances{0.01F, 0.04F, 0.06F, 0.2F}, caps(4, 0.1F), found{0.5F, 0.8F, 0.1F, 0.1F};
-  const Support s = count_support(distances, caps, 0.1F, found);
+  std::vector<std::uint8_t> beside(4);
+  mark_beside(found, 0.1F, beside);
+  const Support s = count_support(distances, caps, 0.1F, beside);
   EXPECT_EQ(s.inner, 2U);
   EXPECT_EQ(s.beside, 2U) << "of the first slab, those less than seven tau from a found model";
 }

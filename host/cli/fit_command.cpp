@@ -18,6 +18,7 @@
 #include "host/cli/console.hpp"
 #include "host/cli/html_report.hpp"
 #include "host/cli/options.hpp"
+#include "host/cli/process.hpp"
 #include "host/cli/report.hpp"
 
 namespace swarmfit::cli {
@@ -153,6 +154,7 @@ int run(FitArguments& arguments, const CLI::App& app) {
     auto cloud = read_input(arguments);
     if (!cloud) return complain(cloud.error());
     input = std::move(*cloud);
+    settle_large_input(input.values32.size() * sizeof(float) + input.values64.size() * sizeof(double));
     load_ms = loading.ms();
 
     progress.say("fitting");

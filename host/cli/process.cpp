@@ -42,6 +42,17 @@ void settle_process() {
   if (void* found = dlsym(RTLD_DEFAULT, "blas_thread_shutdown_")) reinterpret_cast<Shutdown>(found)();
 }
 
+void settle_large_input(std::size_t bytes) {
+#if defined(__GLIBC__)
+  constexpr std::size_t kLarge = std::size_t{1} << 25;
+  if (bytes < kLarge) return;
+  mallopt(M_MMAP_THRESHOLD, static_cast<int>(kLarge / 2));
+  malloc_trim(0);
+#else
+  static_cast<void>(bytes);
+#endif
+}
+
 namespace {
 
 std::string& command() {

@@ -1,6 +1,7 @@
 // What a command that runs once asks of its process.
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 namespace swarmfit::cli {
@@ -10,6 +11,11 @@ namespace swarmfit::cli {
 /// along on some systems, lets go of its workers, which else spin on the processors for the first tens of milliseconds. It starts them again if
 /// it needs them. Where either is not there nothing happens.
 void settle_process();
+
+/// Once an input is loaded. Where its points take so many bytes that memory counts for more than the faults of its pages, what reading them
+/// took goes back to the system, and so do arrays of that size from now on when they are freed: on the heap, what is left between them would
+/// not fit the next.
+void settle_large_input(std::size_t bytes);
 
 /// The command line, for what is written to say how to have it again.
 void remember_command(int argc, const char* const* argv);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <optional>
 
 #include <fmt/format.h>
 
@@ -216,21 +217,22 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     result.threshold = *given;
   }
   swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
-  swarm::MultiModel search(evaluator, kinds, working, part, options.seed, limits, spread);
-  search.watched_by(state_->observer ? &watch : nullptr);
-  if (auto done = search.run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
-  std::vector<models::Placed> found = search.found();
+  std::optional<swarm::MultiModel> search(std::in_place, evaluator, kinds, working, part, options.seed, limits, spread);
+  search->watched_by(state_->observer ? &watch : nullptr);
+  if (auto done = search->run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
+  std::vector<models::Placed> found = search->found();
   const auto tau = static_cast<float>(result.threshold);
   const std::vector<float> allowed = swarm::allowed_by(thin_rows ? swarm::spread_of(options.noise, *whole, depth) : spread, tau);
   const swarm::Ground ground{.evaluator = evaluator, .space = *kinds.front().space, .points = *whole, .tau = tau, .allowed = allowed};
   if (thin_rows) {
     found = moved(std::move(found), working.frame(), whole->frame());
-    const std::vector<models::Placed> hidden = moved(search.hidden(), working.frame(), whole->frame());
-    if (auto done = swarm::refit(ground, found, search.shares_points(), hidden); !done) return tl::unexpected(done.error());
+    const std::vector<models::Placed> hidden = moved(search->hidden(), working.frame(), whole->frame());
+    if (auto done = swarm::refit(ground, found, search->shares_points(), hidden); !done) return tl::unexpected(done.error());
   }
-  result.labels = thin_rows ? std::vector<std::uint16_t>{} : search.labels();
+  result.labels = thin_rows ? std::vector<std::uint16_t>{} : search->labels();
   std::vector<float> corners;
-  for (const models::Placed& model : search.found()) corners.push_back(search.corner(*model.space));
+  for (const models::Placed& model : search->found()) corners.push_back(search->corner(*model.space));
+  search.reset();  // of many points it holds much
   if (auto done = swarm::settle(ground, found, corners, result); !done) return tl::unexpected(done.error());
   if (const auto thrown = state_->watch->take()) return fail(Error::Kind::bad_input, *thrown);
   result.backend = backend();

@@ -16,9 +16,10 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
-constexpr double kAlike = 0.02;   // share of their saving by which the bests of two swarms that found the same may differ
-constexpr int kFullRounds = 1;    // of refinement on all points, where it was done on a part of them before
+constexpr double kStable = 0.01;                    // spread of the list of global bests, as a share of the scale, below which it is stable
+constexpr double kAlike = 0.02;                     // share of their saving by which the bests of two swarms that found the same may differ
+constexpr int kFullRounds = 1;                      // of refinement on all points, where it was done on a part of them before
+constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
 
 }  // namespace
 
@@ -42,7 +43,6 @@ MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kin
   part_ground_.allowed = part_allowed_;
   part_ground_.widest = widest_of(part_allowed_);
   for (const Kind& kind : kinds_) landscapes_.emplace_back(evaluator, *kind.space, points.frame(), kind.settings);
-  restore_caps();
 }
 
 void MultiModel::restore_caps() {
@@ -109,6 +109,7 @@ Expected<> MultiModel::adopt(const Known& known, const ModelCallback& on_model, 
 Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
                            std::span<const Known> known) {
   if (auto done = evaluator_.set_points(searched().view()); !done) return tl::unexpected(to_error(done.error()));
+  restore_caps();  // not before: setting points takes most of the memory
   if (auto done = show(caps_); !done) return done;
   Seeds seeds(kinds_.size());
   for (const Model& model : warm_start) {
@@ -268,6 +269,23 @@ Expected<MultiModel::Outcome> MultiModel::search(const Seeds& seeds, Candidate& 
   return reached;
 }
 
+bool MultiModel::lists_distances() const noexcept { return points_.size() <= 4 * kRun || kinds_.size() > 1 || !allowed_.empty(); }
+
+template <class Visit>
+Expected<> MultiModel::in_runs(const Candidate& candidate, Visit&& visit) const {
+  if (lists_distances()) {
+    visit(std::size_t{0}, std::span<const float>(candidate.distances));
+    return {};
+  }
+  std::vector<float> distances;
+  for (std::size_t first = 0; first < points_.size(); first += kRun) {
+    distances.resize(std::min(kRun, points_.size() - first));
+    if (auto done = tell_distances(whole(candidate.kind), candidate.theta, first, distances); !done) return done;
+    visit(first, std::span<const float>(distances));
+  }
+  return {};
+}
+
 int MultiModel::full_rounds() const noexcept { return part_searched_ ? kFullRounds : kMostRounds; }
 
 Expected<> MultiModel::refine(Candidate& candidate) {
@@ -276,12 +294,17 @@ Expected<> MultiModel::refine(Candidate& candidate) {
     const Ground part = part_ground_.of(space(candidate.kind));
     if (auto done = refine_one(part, settings_.loss, part_caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
   }
-  auto least = refine_one(whole(candidate.kind), settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0, &candidate.distances);
+  auto least = refine_one(whole(candidate.kind), settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0,
+                          lists_distances() ? &candidate.distances : nullptr);
   if (!least) return tl::unexpected(least.error());
   candidate.loss = *least;
+  candidate.support = {};
   std::vector<float> caps_room, room;
-  candidate.support = count_support(levelled(candidate.distances, room), levelled(caps_, caps_room), tau_, nearest_);
-  return {};
+  return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
+    const std::span<const float> caps = std::span(caps_).subspan(first, distances.size());
+    const std::span<const std::uint8_t> beside = std::span(beside_).subspan(beside_.empty() ? 0 : first);
+    candidate.support = count_support(levelled(distances, room), levelled(caps, caps_room), tau_, beside, candidate.support);
+  });
 }
 
 Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result) {
@@ -306,11 +329,14 @@ Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallbac
 }
 
 Expected<> MultiModel::deflate(const Candidate& candidate) {
-  const std::vector<float>& distances = candidate.distances;
-  nearest_.resize(distances.size(), std::numeric_limits<float>::infinity());
+  beside_.resize(points_.size());
   std::vector<float> room;
-  take_nearer(levelled(distances, room), nearest_);
-  swarm::deflate(distances, tau_, tail_reach(candidate.support), settings_.dead_zone_slope, caps_, allowed_);
+  const int reach = tail_reach(candidate.support);
+  auto done = in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
+    mark_beside(levelled(distances, room), tau_, std::span(beside_).subspan(first, distances.size()));
+    swarm::deflate(distances, tau_, reach, settings_.dead_zone_slope, std::span(caps_).subspan(first, distances.size()), allowed_);
+  });
+  if (!done) return done;
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   return show(caps_);
 }

@@ -77,7 +77,7 @@ class MultiModel {
     models::Position theta;
     double loss = 0;
     double saving = 0;             // of the swarm's best, on the points that were searched
-    std::vector<float> distances;  // of all points
+    std::vector<float> distances;  // of all points, where these are listed
     Support support;
   };
   using Seeds = std::vector<std::vector<models::Position>>;  // of each kind
@@ -125,6 +125,11 @@ class MultiModel {
   double loss_of_nothing(std::span<const float> caps) const;
   /// Distances or caps, one a point, in measures that make the threshold of each tau; in `room` where they are not so already.
   std::span<const float> levelled(std::span<const float> values, std::vector<float>& room) const;
+  /// Are a candidate's distances kept? Of very many points they would be most of the memory; they are told anew, a run at a time.
+  bool lists_distances() const noexcept;
+  /// visit(first, distances) for runs of points, from the first to the last.
+  template <class Visit>
+  Expected<> in_runs(const Candidate& candidate, Visit&& visit) const;
   /// Do fewer points remain unexplained than a model must have?
   bool too_few_left() const;
   /// Has a swarm in vain come to what the one before it came to?
@@ -173,7 +178,7 @@ class MultiModel {
   std::vector<float> allowed_, part_allowed_;  // tau of each point, and of the part's; empty: tau for all
   Ground ground_, part_ground_;                // all points, and the part; as the first kind has it
   std::vector<float> caps_, part_caps_;        // one a point; what is left to explain, in both kinds of deflation. The part's as shown last
-  std::vector<float> nearest_;                 // one a point: how far the nearest found model is, levelled; empty until there is one
+  std::vector<std::uint8_t> beside_;           // one a point: is it beside a found model? Empty until there is one
   std::vector<models::Placed> found_, hidden_;
   std::vector<models::Position> proposals_;  // what the joint end may add to them
   std::vector<std::uint16_t> labels_;

@@ -13,13 +13,18 @@ double saved(std::span<const float> caps, std::span<const float> distances) {
   return sum;
 }
 
-Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const float> found) {
+void mark_beside(std::span<const float> distances, float tau, std::span<std::uint8_t> beside) {
+  const float reach = static_cast<float>(Support::kSlabs) * tau;
+  for (std::size_t i = 0; i < beside.size(); ++i) beside[i] |= distances[i] < reach ? 1 : 0;
+}
+
+Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside,
+                      const Support& before) {
   // The last place is for all that is farther, or NaN; one more for what is explained already.
   constexpr auto kFarther = static_cast<float>(Support::kSlabs);
   std::array<std::size_t, Support::kSlabs + 2> counts{};
   const float half = 0.5F * tau, least = kUnexplained * tau, reach = kFarther * tau, per_tau = 1 / tau;
-  double square = 0;
-  std::size_t inner = 0, beside = 0;
+  Support s = before;
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float d = distances[i];
     const bool unexplained = caps[i] >= least && !std::isnan(d);
@@ -27,16 +32,12 @@ Support count_support(std::span<const float> distances, std::span<const float> c
     const std::size_t place = unexplained ? static_cast<std::size_t>(std::min(slab, kFarther)) : Support::kSlabs + 1;
     ++counts[place];
     if (place != 0) continue;
-    square += static_cast<double>(d) * static_cast<double>(d);
-    inner += d < half ? 1 : 0;
-    beside += !found.empty() && found[i] < reach ? 1 : 0;
+    s.square += static_cast<double>(d) * static_cast<double>(d);
+    s.inner += d < half ? 1 : 0;
+    s.beside += beside.empty() ? 0 : beside[i];
   }
-  Support s;
-  s.square = square;
-  s.inner = inner;
-  s.beside = beside;
-  s.unexplained = distances.size() - counts[Support::kSlabs + 1];
-  std::copy_n(counts.begin(), Support::kSlabs, s.slabs.begin());
+  s.unexplained += distances.size() - counts[Support::kSlabs + 1];
+  for (std::size_t k = 0; k < Support::kSlabs; ++k) s.slabs[k] += counts[k];
   return s;
 }
 

@@ -59,6 +59,18 @@ Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& 
   return evidence;
 }
 
+Expected<> tell_distances(const Ground& ground, const models::Position& theta, std::size_t first, std::span<float> distances) {
+  const models::Position data = ground.space.to_data(theta, ground.points.frame());
+  const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
+  kernels::PointsView run = ground.view();
+  run.data = static_cast<const std::byte*>(run.data) + first * run.stride;
+  run.count = distances.size();
+  kernels::Evidence evidence;
+  const auto done = ground.evaluator.weigh(run, {ground.tau, ground.corner, {}}, std::span(&model, 1), distances, std::span(&evidence, 1));
+  if (!done) return tl::unexpected(to_error(done.error()));
+  return {};
+}
+
 Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
   std::vector<kernels::Evidence> evidence(models.size());
   if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), models, {}, evidence); !done) {

@@ -64,6 +64,10 @@ void take_nearer(std::span<const float> distances, std::span<float> least);
 Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
                                   std::span<float> distances);
 
+/// Distances of a run of the ground's points, from `first` on, to a model. Runs that begin at a multiple of a thousand and twenty-four are
+/// told what a pass over all points would tell.
+Expected<> tell_distances(const Ground& ground, const models::Position& theta, std::size_t first, std::span<float> distances);
+
 /// The same of each of several models, all points within tau.
 Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models);
 

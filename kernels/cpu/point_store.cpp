@@ -13,6 +13,8 @@ namespace {
 
 /// Rows a task reads. Fixed, so that the centre does not depend on the number of threads.
 constexpr std::size_t kChunkRows = 16384;
+/// Points of a cloud whose memory counts for more than the time to ask for it anew.
+constexpr std::size_t kLarge = std::size_t{1} << 20;
 
 /// Calls visit(row, values) for each finite row in [first, last), with `values` its `Width` columns.
 template <class S, std::size_t Width, class Visit>
@@ -73,6 +75,7 @@ void PointStore::assign(const PointsView& points) {
   }
   keep_finite(points, chunks);
   if (dimension_ <= 3 && blocks_ > 1 && !points.ordered) sort();
+  caps_.assign(blocks_ * kBlockPoints, 0.0F);  // after the sort, whose memory is free again
 }
 
 void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunks) {
@@ -80,7 +83,6 @@ void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunk
   const std::size_t padded = blocks_ * kBlockPoints;
   const auto width = static_cast<std::size_t>(dimension_);
   for (std::size_t c = 0; c < kMaxDimension; ++c) columns_[c].resize(c < width ? padded : 0);
-  caps_.assign(padded, 0.0F);
   input_.resize(finite_ == count_ ? 0 : finite_);
   for_each_task(chunks.size(), [&](std::size_t chunk) {
     std::size_t position = chunks[chunk].start;
@@ -110,7 +112,7 @@ void PointStore::sort() {
   const auto width = static_cast<std::size_t>(dimension_);
   std::array<const float*, kMaxDimension> columns{};
   for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
-  const std::span<const std::uint32_t> order = order_.sort(std::span(columns).first(width), finite_);
+  morton_.sort(std::span(columns).first(width), finite_, order_);
   const auto each = [&](auto&& body) {
     for_each_task((finite_ + kChunkRows - 1) / kChunkRows, [&](std::size_t chunk) {
       for (std::size_t i = chunk * kChunkRows; i < std::min(finite_, (chunk + 1) * kChunkRows); ++i) body(i);
@@ -120,14 +122,13 @@ void PointStore::sort() {
     unsorted_.resize(columns_[c].size());
     unsorted_.swap(columns_[c]);
     std::fill(columns_[c].begin() + static_cast<std::ptrdiff_t>(finite_), columns_[c].end(), 0.0F);
-    each([&](std::size_t i) { columns_[c][i] = unsorted_[order[i]]; });
+    each([&](std::size_t i) { columns_[c][i] = unsorted_[order_[i]]; });
   }
-  unsorted_input_.swap(input_);
-  input_.resize(finite_);
-  if (unsorted_input_.empty()) {
-    each([&](std::size_t i) { input_[i] = order[i]; });
-  } else {
-    each([&](std::size_t i) { input_[i] = unsorted_input_[order[i]]; });
+  if (!input_.empty()) each([&](std::size_t i) { order_[i] = input_[order_[i]]; });
+  input_.swap(order_);
+  if (finite_ > kLarge) {
+    Aligned<float>().swap(unsorted_);
+    std::vector<std::uint32_t>().swap(order_);
   }
 }
 

@@ -3,20 +3,33 @@
 
 #include <array>
 #include <cstdint>
+#include <new>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include <oneapi/tbb/cache_aligned_allocator.h>
-
 #include "kernels/blocks.hpp"
 #include "kernels/cpu/cpu_kernels.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/morton_order.hpp"
 
 namespace swarmfit::kernels::cpu {
 
+/// Of whole cache lines. What is freed goes back to the system where it is large; oneTBB's allocator would keep it.
 template <class T>
-using Aligned = std::vector<T, tbb::cache_aligned_allocator<T>>;
+struct LineAllocator {
+  using value_type = T;
+  static constexpr std::align_val_t kLine{128};
+  LineAllocator() = default;
+  template <class U>
+  LineAllocator(const LineAllocator<U>&) noexcept {}
+  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), kLine)); }
+  void deallocate(T* p, std::size_t) noexcept { ::operator delete(p, kLine); }
+  friend bool operator==(const LineAllocator&, const LineAllocator&) noexcept { return true; }
+};
+
+template <class T>
+using Aligned = std::vector<T, LineAllocator<T>>;
 
 class PointStore {
  public:
@@ -65,9 +78,9 @@ class PointStore {
   Aligned<float> caps_;
   float most_cap_ = 0;
   std::vector<std::uint32_t> input_;  ///< empty where it would be the identity
-  MortonOrder order_;
-  Aligned<float> unsorted_;
-  std::vector<std::uint32_t> unsorted_input_;
+  MortonOrder morton_;
+  Aligned<float> unsorted_;  ///< what sorting leaves is kept for the next cloud, unless that is large
+  std::vector<std::uint32_t> order_;
   Aligned<TileBounds> bounds_;
   bool bounds_current_ = false;
   Summing bounds_summing_;

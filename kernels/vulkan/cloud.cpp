@@ -73,15 +73,15 @@ void Cloud::sort() {
   const auto width = static_cast<std::size_t>(dimension_);
   std::array<const float*, kMaxDimension> columns{};
   for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
-  const std::span<const std::uint32_t> order = order_.sort(std::span(columns).first(width), extent_.finite_count);
+  std::vector<std::uint32_t> order;
+  morton_.sort(std::span(columns).first(width), extent_.finite_count, order);
   for (std::size_t c = 0; c < width; ++c) {
     scratch_.resize(order.size());
     std::transform(order.begin(), order.end(), scratch_.begin(), [&](std::uint32_t i) { return columns_[c][i]; });
     columns_[c].swap(scratch_);
   }
-  std::vector<std::uint32_t> rows(order.size());
-  std::transform(order.begin(), order.end(), rows.begin(), [&](std::uint32_t i) { return static_cast<std::uint32_t>(row(i)); });
-  rows_ = std::move(rows);
+  std::transform(order.begin(), order.end(), order.begin(), [&](std::uint32_t i) { return static_cast<std::uint32_t>(row(i)); });
+  rows_ = std::move(order);
 }
 
 void Cloud::write_columns(Segment& segment) {

@@ -6,6 +6,7 @@
 
 #include "kernels/blocks.hpp"
 #include "kernels/checks.hpp"
+#include "kernels/morton_order.hpp"
 #include "kernels/vulkan/buffer.hpp"
 #include "kernels/vulkan/chunk_bounds.hpp"
 #include "kernels/vulkan/tile_shape.hpp"
@@ -65,7 +66,7 @@ class Cloud {
   int dimension_ = 0;
   std::array<std::vector<float>, kMaxDimension> columns_;  // centred, of the finite points in the order they are stored in
   std::vector<float> scratch_;
-  MortonOrder order_;
+  MortonOrder morton_;
   Extent extent_;
   ChunkShape shape_;
   std::vector<std::uint32_t> rows_;  // empty where it would be the identity
