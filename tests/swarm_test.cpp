@@ -1,4 +1,5 @@
 // The parts of the swarm, each against what its equation says, and whole swarms on a landscape that is known.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -240,6 +241,32 @@ TEST(Deflation, ReachFollowsATailAndStopsAtAnEvenBackground) {
   EXPECT_GE(reach(1.5, 0), 3);
 }
 
+TEST(Deflation, ReachIsOneWhereThePlaneHasNoPointsOfItsOwn) {
+  // A noisy floor, and a step beside it.
+  constexpr float kTau = 0.1F;
+  std::vector<double> rows;
+  std::vector<float> distances;
+  for (std::uint32_t k = 0; k < 4000; ++k) {
+    const double x = (k % 80) / 40.0, y = (k / 80) / 50.0, z = k % 4 == 0 ? 0.15 : 0.05;
+    rows.insert(rows.end(), {x, y, z});
+  }
+  for (std::uint32_t k = 0; k < 400; ++k) rows.insert(rows.end(), {2 + (k % 20) / 40.0, (k / 20) / 20.0, 0.15});
+  for (std::size_t i = 2; i < rows.size(); i += 3) distances.push_back(static_cast<float>(rows[i]));
+  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
+  const std::vector<float> caps(distances.size(), kTau);
+  const std::vector<float> reach = local_reach(points, Eigen::Vector3d::UnitZ(), distances, caps, kTau, 2);
+  const auto ones = [&](std::size_t first, std::size_t last) {
+    const auto at = [&](std::size_t i) { return reach.begin() + static_cast<std::ptrdiff_t>(i); };
+    return std::count(at(first), at(last), 1.0F);
+  };
+  EXPECT_LE(ones(0, 4000), 80) << "the floor's tail, but for its rim";
+  EXPECT_GE(ones(4000, 4400), 300) << "the step";
+  std::vector<float> left = caps;
+  deflate(distances, kTau, 2, 2.0, left, {}, reach);
+  EXPECT_EQ(left[0], 0.0F);
+  for (std::size_t i = 4000; i < left.size(); ++i) EXPECT_NEAR(left[i], reach[i] == 1 ? 0.1F : 0.0F, 1e-6F) << i;
+}
+
 Support support(std::size_t inliers, std::size_t band, std::size_t unexplained) {
   Support s;
   s.unexplained = unexplained;
@@ -293,6 +320,20 @@ TEST(Payment, TwoSurfacesSideBySidePayUnlessOneIsTheOthersLayer) {
   const Support s = count_support(distances, caps, 0.1F, beside);
   EXPECT_EQ(s.inner, 2U);
   EXPECT_EQ(s.beside, 2U) << "of the first slab, those less than seven tau from a found model";
+}
+
+TEST(Payment, PointsSharedWithAFoundModelCountWhereTheyAreNearer) {
+  Settings settings;
+  settings.min_inliers = 100;
+  Support s = support(85, 0, 1000);
+  EXPECT_FALSE(pays(s, settings, 3));
+  s.shared = 20;
+  EXPECT_TRUE(pays(s, settings, 3));
+  s.slabs[0] = 75;
+  s.shared = 200;
+  EXPECT_FALSE(pays(s, settings, 3)) << "too few of its own";
+  const std::vector<float> distances{0.02F, 0.08F, 0.02F, 0.02F}, caps{0.0F, 0.0F, 0.1F, 0.0F}, found{0.05F, 0.05F, 0.5F, 0.2F};
+  EXPECT_EQ(count_support(distances, caps, 0.1F, {}, {}, found).shared, 1U) << "explained, and nearer than what explains it";
 }
 
 TEST(NoiseScale, GaussianPartAmongUniformBackground) {

@@ -4,13 +4,86 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+
+#include <Eigen/Geometry>
 
 namespace swarmfit::swarm {
 namespace {
 
 constexpr std::size_t kFurthest = Support::kSlabs - 2;  // slabs that a tail may fill
 constexpr double kTailShare = 0.12;                     // of what the model's own slab holds above the next one
-constexpr double kDeviations = 3;                       // a fall that chance would not make
+constexpr double kDeviations = 3;                       // a fall, or a lack, that chance would not make
+
+constexpr double kPerCell = 24;      // points near a plane in a cell of it, about
+constexpr double kOwn = 0.3;         // for each of a cell's points beside the plane: where it has fewer of its own, these are no tail of it
+constexpr std::uint32_t kLeast = 6;  // points beside it that tell something
+
+/// Where a point near a plane stands on it [working frame].
+struct Footprint {
+  std::uint32_t point;
+  float x, y;
+};
+
+/// Of the unexplained points within reach.
+std::vector<Footprint> footprints(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
+                                  std::span<const float> caps, float tau, int reach) {
+  const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+  const float far = static_cast<float>(reach) * tau, least = kUnexplained * tau;
+  std::vector<Footprint> near;
+  for (std::size_t i = 0; i < caps.size(); ++i) {
+    if (!(distances[i] < far) || caps[i] < least) continue;
+    const Eigen::Vector3d p = points.point<3>(i);
+    near.push_back({static_cast<std::uint32_t>(i), static_cast<float>(p.dot(u)), static_cast<float>(p.dot(v))});
+  }
+  return near;
+}
+
+/// A plane in square cells, of such a size that its points would fill a rectangle with kPerCell in each.
+class PlaneCells {
+ public:
+  struct Cell {
+    std::uint32_t own = 0, beside = 0;
+  };
+
+  explicit PlaneCells(std::span<const Footprint> near) : cells_(static_cast<std::size_t>(kAcross) * kAcross) {
+    const auto n = static_cast<double>(near.size());
+    double xx = 0, yy = 0, xy = 0;
+    for (const Footprint& one : near) {
+      x_ += static_cast<double>(one.x) / n;
+      y_ += static_cast<double>(one.y) / n;
+    }
+    for (const Footprint& one : near) {
+      const double x = static_cast<double>(one.x) - x_, y = static_cast<double>(one.y) - y_;
+      xx += x * x / n;
+      yy += y * y / n;
+      xy += x * y / n;
+    }
+    const double area = 12 * std::sqrt(std::max(0.0, xx * yy - xy * xy));
+    // Six standard deviations across; what is beyond goes to the cells on the rim.
+    const double least = std::max(6 * std::sqrt(std::max(xx, yy)) / kAcross, 1e-9);
+    width_ = std::max(std::sqrt(area * kPerCell / n), least);
+  }
+
+  Cell& at(const Footprint& one) {
+    const auto place = [&](float along, double middle) {
+      return std::clamp(static_cast<int>(std::floor((static_cast<double>(along) - middle) / width_)) + kAcross / 2, 0, kAcross - 1);
+    };
+    return cells_[static_cast<std::size_t>(place(one.y, y_) * kAcross + place(one.x, x_))];
+  }
+
+ private:
+  static constexpr int kAcross = 64;
+  std::vector<Cell> cells_;
+  double x_ = 0, y_ = 0, width_ = 1;
+};
+
+/// Are the points beside a plane in this cell another surface? `share`: of all points near the plane, those that are its own.
+bool is_another(const PlaneCells::Cell& cell, double share) {
+  if (cell.beside < kLeast) return false;
+  const double own = cell.own, n = own + cell.beside;
+  return own < kOwn * cell.beside && own < share * n - kDeviations * std::sqrt(share * (1 - share) * n);
+}
 
 }  // namespace
 
@@ -28,8 +101,36 @@ int tail_reach(const Support& support) {
   return reach;
 }
 
-void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps, std::span<const float> allowed) {
+std::vector<float> local_reach(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
+                               std::span<const float> caps, float tau, int reach) {
+  std::vector<float> reaches(caps.size(), static_cast<float>(reach));
+  const std::vector<Footprint> near = footprints(points, normal, distances, caps, tau, reach);
+  if (static_cast<double>(near.size()) < kPerCell) return reaches;
+  PlaneCells cells(near);
+  double own = 0;
+  for (const Footprint& one : near) {
+    const bool mine = distances[one.point] < tau;
+    PlaneCells::Cell& there = cells.at(one);
+    ++(mine ? there.own : there.beside);
+    own += mine ? 1 : 0;
+  }
+  const double share = own / static_cast<double>(near.size());
+  for (const Footprint& one : near) {
+    if (is_another(cells.at(one), share)) reaches[one.point] = 1;
+  }
+  return reaches;
+}
+
+void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps, std::span<const float> allowed,
+             std::span<const float> reaches) {
   const auto steep = static_cast<float>(slope);
+  if (!reaches.empty()) {
+    for (std::size_t i = 0; i < caps.size(); ++i) {
+      const float left = steep * (distances[i] - reaches[i] * (allowed.empty() ? tau : allowed[i]));
+      caps[i] = left < caps[i] ? std::max(left, 0.0F) : caps[i];
+    }
+    return;
+  }
   if (!allowed.empty()) {
     for (std::size_t i = 0; i < caps.size(); ++i) {
       const float left = steep * (distances[i] - static_cast<float>(reach) * allowed[i]);

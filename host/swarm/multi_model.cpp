@@ -11,6 +11,7 @@
 #include "host/swarm/noise_model.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
+#include "host/swarm/split.hpp"
 #include "host/swarm/swarm.hpp"
 
 namespace swarmfit::swarm {
@@ -89,6 +90,50 @@ Expected<> MultiModel::take(const Candidate& candidate, Outcome outcome, const M
   return {};
 }
 
+Expected<> MultiModel::take_found(Candidate& candidate, const ModelCallback& on_model, FitResult& result) {
+  auto other = come_apart(candidate);
+  if (!other) return tl::unexpected(other.error());
+  if (auto done = take(candidate, Outcome::found, on_model, result); !done || !*other) return done;
+  if (!stop_reason_.empty() || full()) return {};
+  Candidate rest;
+  rest.theta = **other;
+  steps_ = 0;
+  if (auto done = look(rest, full_rounds()); !done) return done;
+  return pays(rest.support, settings_, space(0).minimal_sample()) ? take_found(rest, on_model, result) : Expected<>();
+}
+
+Expected<std::optional<models::Position>> MultiModel::come_apart(Candidate& candidate) {
+  const bool flat = kinds_.size() == 1 && space(0).type() == ModelType::plane && settings_.deflation == Deflation::residual;
+  if (!flat || !part_searched_ || !settings_.refine || !allowed_.empty() || !looks_loose(candidate.support, settings_.threshold)) {
+    return std::nullopt;
+  }
+  const Suspect suspect{candidate.theta, candidate.distances, caps_, settings_.min_inliers};
+  const auto pair = crossing_pair(part_ground_, suspect, random_, splits_++);
+  if (!pair) return tl::unexpected(pair.error());
+  if (!*pair) return std::nullopt;
+  std::array<Candidate, 2> halves;
+  for (std::size_t k = 0; k < halves.size(); ++k) {
+    halves[k].theta = (**pair)[k];
+    if (auto done = look(halves[k], 0); !done) return tl::unexpected(done.error());
+  }
+  std::vector<float> both = halves[0].distances;
+  take_nearer(halves[1].distances, both);
+  if (!(saved(caps_, both) > saved(caps_, candidate.distances))) return std::nullopt;
+  const std::size_t larger = halves[0].support.inliers() < halves[1].support.inliers() ? 1 : 0;
+  Candidate &one = halves[larger], &other = halves[1 - larger];
+  // Both must pay, the second by what the first leaves it.
+  const int sample = space(0).minimal_sample();
+  if (!pays(one.support, settings_, sample)) return std::nullopt;
+  std::vector<float> caps = caps_;
+  Near near = near_;
+  if (auto done = sink(one, caps, near); !done) return tl::unexpected(done.error());
+  if (auto done = count(other, caps, near); !done) return tl::unexpected(done.error());
+  if (!pays(other.support, settings_, sample)) return std::nullopt;
+  one.saving = candidate.saving;
+  candidate = std::move(one);
+  return std::move(other.theta);
+}
+
 Expected<> MultiModel::adopt(const Known& known, const ModelCallback& on_model, FitResult& result) {
   Candidate candidate;
   candidate.kind = known.kind;
@@ -142,7 +187,8 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     if (*outcome == Outcome::interrupted) break;
     if (*outcome == Outcome::found || *outcome == Outcome::flat) {
       unpaid = 0;
-      if (auto done = take(best, *outcome, on_model, result); !done) return done;
+      if (auto done = *outcome == Outcome::found ? take_found(best, on_model, result) : take(best, *outcome, on_model, result); !done)
+        return done;
       continue;
     }
     if (std::exchange(eager_, false)) continue;  // what is not found at once is looked for at length
@@ -163,7 +209,7 @@ bool MultiModel::too_few_left() const {
   if (settings_.deflation == Deflation::parametric || shares_out() || kinds_.size() > 1) return false;
   std::size_t left = 0;
   for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * ground_.allowed_at(i) ? 1 : 0;
-  return left < settings_.min_inliers;
+  return static_cast<double>(left) < (may_share() ? kOwnShare : 1.0) * static_cast<double>(settings_.min_inliers);
 }
 
 bool MultiModel::agree(double saving, double before) const noexcept {
@@ -231,7 +277,7 @@ Expected<> MultiModel::watched_step(Swarm& swarm, std::size_t kind, const Sample
 
 Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate) {
   Settings settings = kinds_[candidate.kind].settings;
-  if (eager_ && settings.eager_stall > 0) settings.stall = settings.stall_paid = std::min(settings.stall, settings.eager_stall);
+  if (eager_ && settings.eager_stall > 0) settings.stall = std::min(settings.stall, settings.eager_stall);
   Swarm swarm(space(candidate.kind), settings, random_);
   auto flown = fly(swarm, candidate.kind, round, seeds, caps_, kUnexplained * tau_);
   if (!flown) return tl::unexpected(flown.error());
@@ -294,16 +340,25 @@ Expected<> MultiModel::refine(Candidate& candidate) {
     const Ground part = part_ground_.of(space(candidate.kind));
     if (auto done = refine_one(part, settings_.loss, part_caps_, theta, kMostRounds); !done) return tl::unexpected(done.error());
   }
-  auto least = refine_one(whole(candidate.kind), settings_.loss, caps_, theta, settings_.refine ? full_rounds() : 0,
-                          lists_distances() ? &candidate.distances : nullptr);
+  return look(candidate, settings_.refine ? full_rounds() : 0);
+}
+
+Expected<> MultiModel::look(Candidate& candidate, int rounds) {
+  auto least =
+      refine_one(whole(candidate.kind), settings_.loss, caps_, candidate.theta, rounds, lists_distances() ? &candidate.distances : nullptr);
   if (!least) return tl::unexpected(least.error());
   candidate.loss = *least;
+  return count(candidate, caps_, near_);
+}
+
+Expected<> MultiModel::count(Candidate& candidate, std::span<const float> caps, const Near& near) const {
   candidate.support = {};
   std::vector<float> caps_room, room;
   return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
-    const std::span<const float> caps = std::span(caps_).subspan(first, distances.size());
-    const std::span<const std::uint8_t> beside = std::span(beside_).subspan(beside_.empty() ? 0 : first);
-    candidate.support = count_support(levelled(distances, room), levelled(caps, caps_room), tau_, beside, candidate.support);
+    const std::span<const float> here = caps.subspan(first, distances.size());
+    const std::span<const std::uint8_t> beside = std::span(near.beside).subspan(near.beside.empty() ? 0 : first);
+    const std::span<const float> nearest = std::span(near.nearest).subspan(near.nearest.empty() ? 0 : first);
+    candidate.support = count_support(levelled(distances, room), levelled(here, caps_room), tau_, beside, candidate.support, nearest);
   });
 }
 
@@ -328,15 +383,24 @@ Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallbac
   return !on_model || on_model(result.models.back()) == Verdict::go_on;
 }
 
-Expected<> MultiModel::deflate(const Candidate& candidate) {
-  beside_.resize(points_.size());
-  std::vector<float> room;
+Expected<> MultiModel::sink(const Candidate& candidate, std::vector<float>& caps, Near& near) const {
+  near.beside.resize(points_.size());
+  if (may_share()) near.nearest.resize(points_.size(), std::numeric_limits<float>::infinity());
+  std::vector<float> room, reaches;
   const int reach = tail_reach(candidate.support);
-  auto done = in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
-    mark_beside(levelled(distances, room), tau_, std::span(beside_).subspan(first, distances.size()));
-    swarm::deflate(distances, tau_, reach, settings_.dead_zone_slope, std::span(caps_).subspan(first, distances.size()), allowed_);
+  if (lists_distances() && reach > 1 && space(candidate.kind).type() == ModelType::plane && allowed_.empty()) {
+    reaches = local_reach(points_, candidate.theta.head<3>(), candidate.distances, caps, tau_, reach);
+  }
+  return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
+    const std::span<const float> level = levelled(distances, room);
+    mark_beside(level, tau_, std::span(near.beside).subspan(first, distances.size()));
+    if (!near.nearest.empty()) take_nearer(level, std::span(near.nearest).subspan(first, distances.size()));
+    swarm::deflate(distances, tau_, reach, settings_.dead_zone_slope, std::span(caps).subspan(first, distances.size()), allowed_, reaches);
   });
-  if (!done) return done;
+}
+
+Expected<> MultiModel::deflate(const Candidate& candidate) {
+  if (auto done = sink(candidate, caps_, near_); !done) return done;
   if (settings_.deflation == Deflation::parametric) return {};  // there the caps only tell what a model still explains
   return show(caps_);
 }

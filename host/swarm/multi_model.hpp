@@ -96,12 +96,27 @@ class MultiModel {
   /// What follows once a search has come to a model, be it a hidden one.
   Expected<> take(const Candidate& candidate, Outcome outcome, const ModelCallback& on_model, FitResult& result);
   Expected<> refine(Candidate& candidate);
+  /// So many rounds of refinement on all points; distances, loss and support of what comes of it.
+  Expected<> look(Candidate& candidate, int rounds);
+  /// Where points are beside what has been found.
+  struct Near {
+    std::vector<std::uint8_t> beside;  ///< one a point: is it beside a found model? Empty until there is one
+    std::vector<float> nearest;        ///< one a point, where points may be shared: how far the nearest found model is
+  };
+  /// The candidate's support, by its distances.
+  Expected<> count(Candidate& candidate, std::span<const float> caps, const Near& near) const;
+  /// What the candidate explains sinks out of the caps.
+  Expected<> sink(const Candidate& candidate, std::vector<float>& caps, Near& near) const;
+  /// Where a plane that was found runs across two surfaces, one of these takes its place; the other is what is returned.
+  Expected<std::optional<models::Position>> come_apart(Candidate& candidate);
+  Expected<> take_found(Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<bool> accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate(const Candidate& candidate);
   Expected<> finish(FitResult& result);
   /// Each model refined on what the others leave it, as far as that does not raise the energy of all.
   Expected<> polish();
   Expected<> polish_each();
+  Expected<> polish_at_once();  ///< a round of it for models that see all points, and only those
   Expected<> keep_what_lowers(const std::vector<models::Placed>& before);
   /// The least absolute deviations of a model run through as many points as it has degrees of freedom (Barrodale and Roberts 1973):
   /// from the points nearest to it, one at a time is exchanged for whichever lowers the loss most, until none does.
@@ -130,6 +145,9 @@ class MultiModel {
   /// visit(first, distances) for runs of points, from the first to the last.
   template <class Visit>
   Expected<> in_runs(const Candidate& candidate, Visit&& visit) const;
+  /// May a model pay with points that a found one explains less well? Few points are labelled with an eye to their neighbours, kinds compete
+  /// for points, and where each point has a threshold of its own the noise's tails are wide.
+  bool may_share() const noexcept { return part_searched_ && kinds_.size() == 1 && allowed_.empty(); }
   /// Do fewer points remain unexplained than a model must have?
   bool too_few_left() const;
   /// Has a swarm in vain come to what the one before it came to?
@@ -178,15 +196,15 @@ class MultiModel {
   std::vector<float> allowed_, part_allowed_;  // tau of each point, and of the part's; empty: tau for all
   Ground ground_, part_ground_;                // all points, and the part; as the first kind has it
   std::vector<float> caps_, part_caps_;        // one a point; what is left to explain, in both kinds of deflation. The part's as shown last
-  std::vector<std::uint8_t> beside_;           // one a point: is it beside a found model? Empty until there is one
+  Near near_;
   std::vector<models::Placed> found_, hidden_;
   std::vector<models::Position> proposals_;  // what the joint end may add to them
   std::vector<std::uint16_t> labels_;
-  double scale_ = 0;                        // loss of a model that explains nothing
-  std::size_t steps_ = 0;                   // of this round's swarms
-  std::uint32_t round_ = 0, contests_ = 0;  // swarms flown so far
-  bool eager_ = false;                      // do swarms end soon, until one of them finds nothing?
-  bool looked_flat_ = false;                // since the last model was found
+  double scale_ = 0;                                     // loss of a model that explains nothing
+  std::size_t steps_ = 0;                                // of this round's swarms
+  std::uint32_t round_ = 0, contests_ = 0, splits_ = 0;  // swarms flown so far
+  bool eager_ = false;                                   // do swarms end soon, until one of them finds nothing?
+  bool looked_flat_ = false;                             // since the last model was found
   Watch* watch_ = nullptr;
   std::string stop_reason_;
 };

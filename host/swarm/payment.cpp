@@ -19,7 +19,7 @@ void mark_beside(std::span<const float> distances, float tau, std::span<std::uin
 }
 
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside,
-                      const Support& before) {
+                      const Support& before, std::span<const float> nearest) {
   // The last place is for all that is farther, or NaN; one more for what is explained already.
   constexpr auto kFarther = static_cast<float>(Support::kSlabs);
   std::array<std::size_t, Support::kSlabs + 2> counts{};
@@ -31,6 +31,7 @@ Support count_support(std::span<const float> distances, std::span<const float> c
     const float slab = d < reach ? d * per_tau : kFarther;
     const std::size_t place = unexplained ? static_cast<std::size_t>(std::min(slab, kFarther)) : Support::kSlabs + 1;
     ++counts[place];
+    s.shared += !unexplained && d < tau && !nearest.empty() && nearest[i] < tau && d < nearest[i] ? 1 : 0;
     if (place != 0) continue;
     s.square += static_cast<double>(d) * static_cast<double>(d);
     s.inner += d < half ? 1 : 0;
@@ -66,7 +67,8 @@ double log_false_alarms(const Support& support, int minimal_sample, double least
 
 bool pays(const Support& support, const Settings& settings, int minimal_sample) {
   constexpr double kLogFalseAlarms = -4.605170185988091;  // log 0.01: one invented model in a hundred clouds of noise
-  if (support.inliers() < settings.min_inliers) return false;
+  const auto own = static_cast<double>(support.inliers()), least = static_cast<double>(settings.min_inliers);
+  if (support.inliers() + support.shared < settings.min_inliers || own < kOwnShare * least) return false;
   // As it would be on the whole cloud.
   Support whole;
   const auto scaled = [&](std::size_t n) { return static_cast<std::size_t>(static_cast<double>(n) * settings.stands_for); };

@@ -18,6 +18,7 @@ struct Support {
   double square = 0;                        ///< sum of the squared distances of the first slab [data unit^2]
   std::size_t inner = 0;                    ///< of the first slab, those less than tau / 2 away
   std::size_t beside = 0;                   ///< of the first slab, those less than kSlabs tau from what has been found
+  std::size_t shared = 0;  ///< explained points less than tau away, and nearer than to what has been found and explains them
 
   std::size_t inliers() const noexcept { return slabs[0]; }
   /// What surrounds the model.
@@ -27,12 +28,17 @@ struct Support {
 /// Of tau: a point is unexplained while its cap is at least that.
 inline constexpr float kUnexplained = 0.5F;
 
+/// Of the points that a model must have: at least so many nobody else may explain; the others it may have from found models that it is nearer
+/// to these points than.
+inline constexpr double kOwnShare = 0.8;
+
 /// What a model at these distances saves of what the points may cost, in the caps' unit. NaN saves nothing.
 double saved(std::span<const float> caps, std::span<const float> distances);
 
-/// NaN distances count for nothing. `beside` is empty or one a point, as by mark_beside(); `before` is of the points that come before these.
+/// NaN distances count for nothing. `beside` is empty or one a point, as by mark_beside(); `before` is of the points that come before these;
+/// `nearest` is empty, and no point is shared, or one a point: how far the nearest found model is.
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside = {},
-                      const Support& before = {});
+                      const Support& before = {}, std::span<const float> nearest = {});
 
 /// Marks, with 1, points less than kSlabs tau from a model that was found. NaN is not.
 void mark_beside(std::span<const float> distances, float tau, std::span<std::uint8_t> beside);

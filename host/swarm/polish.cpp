@@ -68,7 +68,32 @@ Expected<> MultiModel::keep_what_lowers(const std::vector<models::Placed>& befor
   return {};
 }
 
+Expected<> MultiModel::polish_at_once() {
+  // The points are loaded once for all models.
+  const auto weighed = [&](const std::vector<models::Placed>& models) {
+    ModelRows rows(points_.frame(), models.size());
+    for (const auto& [of, theta] : models) rows.add(*of, theta);
+    return weigh_all(ground_, rows.views());
+  };
+  const auto before = weighed(found_);
+  if (!before) return tl::unexpected(before.error());
+  std::vector<models::Placed> refined = found_;
+  for (std::size_t m = 0; m < found_.size(); ++m) {
+    if (!swarm::refine(ground_.of(*found_[m].space), (*before)[m], {}, {}, refined[m].theta)) refined[m] = found_[m];
+  }
+  const auto after = weighed(refined);
+  if (!after) return tl::unexpected(after.error());
+  for (std::size_t m = 0; m < found_.size(); ++m) {
+    if ((*after)[m].cost < (*before)[m].cost) found_[m] = refined[m];
+  }
+  return {};
+}
+
 Expected<> MultiModel::polish_each() {
+  const bool simple = part_searched_ && !shares_points() && settings_.loss == Loss::truncated_l1;
+  if (simple && std::all_of(found_.begin(), found_.end(), [](const models::Placed& model) { return model.space->closed_form(); })) {
+    return polish_at_once();
+  }
   // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs. Not so among kinds: a ball
   // lies along the table that it lies on.
   restore_caps();

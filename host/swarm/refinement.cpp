@@ -182,9 +182,10 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed
 Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
   constexpr std::uint16_t kSeveral = 65535;
   std::vector<std::uint16_t> owner(ground.size(), 0);
-  std::vector<float> distances(ground.size());
+  const auto all = measure(ground, models);
+  if (!all) return tl::unexpected(all.error());
   for (std::size_t m = 0; m < models.size(); ++m) {
-    if (auto done = weigh(ground.of(*models[m].space), models[m].theta, {}, distances); !done) return tl::unexpected(done.error());
+    const std::vector<float>& distances = (*all)[m];
     const auto mine = static_cast<std::uint16_t>(m + 1);
     for (std::size_t i = 0; i < owner.size(); ++i) {
       const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;

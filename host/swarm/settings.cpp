@@ -169,13 +169,12 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.iterations = options.iterations.value_or(s.iterations);
   // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
   // Such short swarms miss more, so one more of them may.
-  constexpr int kStallOnPart = 5, kPatienceOnPart = 3;
-  // And where there is a model to take, refinement brings it the rest of the way: a hundredth of the saving is for that.
-  constexpr int kStallPaid = 3, kFlatOnPart = 64;
+  constexpr int kStallOnPart = 3, kPatienceOnPart = 3;
+  // And refinement brings it the rest of the way: a hundredth of the saving is for that.
+  constexpr int kFlatOnPart = 64;
   constexpr double kStillOnPart = 0.01;
   const bool on_part = s.searches_part(finite_points);
   s.stall = options.stall.value_or(on_part ? kStallOnPart : s.stall);
-  s.stall_paid = on_part && !options.stall ? kStallPaid : s.stall;
   if (on_part) {
     s.patience = kPatienceOnPart;
     s.still = kStillOnPart;
@@ -194,8 +193,6 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   const auto least = static_cast<std::size_t>(2 * sample + 1);
   const auto wanted = static_cast<std::size_t>(std::ceil(static_cast<double>(options.min_inliers) / s.stands_for));
   s.min_inliers = options.min_inliers > 0 ? wanted : std::max(share, least);
-  const double searched = on_part ? static_cast<double>(s.search_points) / static_cast<double>(fitted) : 1.0;
-  s.paid = threshold * static_cast<double>(s.min_inliers) * searched;
   return s;
 }
 

@@ -23,8 +23,6 @@ struct Settings {
   int particles = 100;
   int iterations = 200;
   int stall = 20;
-  int stall_paid = 20;       ///< the same, once the best saves `paid`
-  double paid = 0;           ///< saving on the searched points that no model pays for with less [data unit]
   int eager_stall = 0;       ///< the same of the first swarms, until one of them finds nothing that pays; 0: all are alike
   double inertia = 1.0;      ///< w of Eq. (1)
   double cognitive = 2.1;    ///< c1

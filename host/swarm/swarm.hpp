@@ -36,7 +36,7 @@ class Swarm {
   /// Scores every particle, then moves it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
   Expected<> step(Landscape& landscape, const Sampler& sampler, double scale);
 
-  bool converged() const noexcept { return still_steps_ >= (saving() > settings_.paid ? settings_.stall_paid : settings_.stall); }
+  bool converged() const noexcept { return still_steps_ >= settings_.stall; }
   int steps() const noexcept { return steps_; }
   const models::Position& best() const noexcept { return list_.back().position; }
   /// Of the best, against a model that explains nothing.
