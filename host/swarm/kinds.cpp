@@ -33,6 +33,7 @@ std::vector<Kind> make_kinds(const FitOptions& options) {
 
 void resolve(std::vector<Kind>& kinds, const FitOptions& options, std::size_t finite_points, double threshold) {
   FitOptions one = options;
+  if (kinds.size() > 1) one.rivals = options.kinds();  // none of them is alone, and all see the same points
   int patience = 0;
   for (Kind& kind : kinds) {
     one.model = kind.space->type();

@@ -165,21 +165,28 @@ Settings for_kind(Settings s, ModelType type) {
 
 Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold) {
   Settings s = for_kind(preset(options.preset), options.model);
+  if (s.joint && options.model == ModelType::plane && options.rivals.empty()) {
+    // Planes have points enough to be seen among fewer: as many are found, and right, as among 16384.
+    s.search_points = 6144;
+    s.fit_points = 12288;
+  }
   s.particles = options.particles.value_or(s.particles);
   s.iterations = options.iterations.value_or(s.iterations);
   // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
   // Such short swarms miss more, so one more of them may.
-  constexpr int kStallOnPart = 3, kPatienceOnPart = 3;
+  constexpr int kStallOnPart = 5, kFlatStallOnPart = 3, kPatienceOnPart = 3;
   // And refinement brings it the rest of the way: a hundredth of the saving is for that.
   constexpr int kFlatOnPart = 64;
   constexpr double kStillOnPart = 0.01;
   const bool on_part = s.searches_part(finite_points);
-  s.stall = options.stall.value_or(on_part ? kStallOnPart : s.stall);
   if (on_part) {
+    const bool flat = options.model == ModelType::plane;
+    s.stall = flat ? kFlatStallOnPart : kStallOnPart;
     s.patience = kPatienceOnPart;
     s.still = kStillOnPart;
-    if (options.model == ModelType::plane) s.particles = options.particles.value_or(kFlatOnPart);
+    if (flat) s.particles = options.particles.value_or(kFlatOnPart);
   }
+  s.stall = options.stall.value_or(s.stall);
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
