@@ -40,6 +40,22 @@ class Scene {
       add(centre + (radius + noise()) * Vector(flat * std::cos(turn), flat * std::sin(turn), z), label);
     }
   }
+  /// The five faces that stand free; axes along the table's.
+  void box(const Vector& foot, const Vector& size, double per_area) {
+    const Vector low = foot - Vector(size[0] / 2, size[1] / 2, 0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+      for (int side = axis == 2 ? 1 : 0; side < 2; ++side) {
+        for (auto count = static_cast<int>(size[a] * size[b] * per_area); count > 0; --count) {
+          Vector p = low;
+          p[axis] += side * size[axis] + noise();
+          p[a] += uniform(0, size[a]);
+          p[b] += uniform(0, size[b]);
+          add(p, 1);
+        }
+      }
+    }
+  }
   void outliers(std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) add(Vector(uniform(-0.6, 0.6), uniform(-0.4, 0.4), uniform(-0.1, 0.5)), 0);
   }
@@ -185,6 +201,21 @@ TEST_P(FitMixed, PlanesAloneGiveNothingCurved) {
     EXPECT_EQ(result->models.size(), kinds.size() > 1 ? 1U : 0U) << told(*result);
     for (const Model& model : result->models) EXPECT_EQ(model.type, ModelType::plane) << told(*result);
   }
+}
+
+TEST_P(FitMixed, FacesThatASphereCrossesAreNotOne) {
+  // A wide sphere within tau of five or ten faces has many points, and no two planes have as many.
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  Scene scene(seed + 400);
+  scene.table(4000);
+  const auto length = [&] { return scene.uniform(0.05, 0.25); };
+  for (int k = 0; k < 10; ++k) {
+    scene.box({scene.uniform(-0.5, 0.5), scene.uniform(-0.3, 0.3), scene.uniform(0, 0.2)}, {length(), length(), length()}, 5000);
+  }
+  scene.outliers(1000);
+  const auto result = fit(scene.points(), options_for({ModelType::sphere}, seed));
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_TRUE(result->models.empty()) << told(*result);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, FitMixed, testing::Range(1, 6));

@@ -46,6 +46,8 @@ class ModelSpace {
   virtual int least_rank() const noexcept = 0;
   /// Whether from_sample looks at the points' normals.
   virtual bool needs_normals() const noexcept { return false; }
+  /// Whether a point's normal tells if it may be the model's.
+  virtual bool agrees_by_normals() const noexcept { return needs_normals(); }
   /// Whether from_sample takes so long, a microsecond or more, that a swarm's samples are worth spreading over threads.
   virtual bool costly_samples() const noexcept { return false; }
   /// Degrees of freedom: rank of the covariance.

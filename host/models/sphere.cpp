@@ -7,6 +7,7 @@ class Sphere final : public Round<3> {
  public:
   ModelType type() const noexcept override { return ModelType::sphere; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::sphere; }
+  bool agrees_by_normals() const noexcept override { return true; }
   Eigen::Vector3d outward(const Position& theta, const Eigen::Vector3d& point) const override { return point - theta.head<3>(); }
 };
 

@@ -12,6 +12,8 @@ namespace {
 constexpr std::uint32_t kFirstContest = 1U << 31;  // rounds of contests, apart from those of the search
 constexpr double kAlong = 0.8;                     // cosine of the angle between a point's normal and the model's
 constexpr int kBriefStall = 1;                     // still steps that end a swarm on one model's points
+constexpr double kGathered = 0.65;                 // share of a curved model's points that must gather about it
+constexpr double kWellGathered = 0.8;              // the same: above, it is not asked against as many faces as a box has
 constexpr double kClearly = 1.1;                   // times what a flat model is worth: a curved one must be worth more
 
 /// The caps of those points that a model explains; 0 elsewhere.
@@ -45,6 +47,22 @@ double MultiModel::agreement(std::size_t kind, const models::Position& theta, st
     if (std::abs(normal.dot(outward)) >= kAlong * outward.norm()) ++along;
   }
   return along / all;
+}
+
+double MultiModel::gathered(const Candidate& candidate) const {
+  // Points of a surface gather about it; those of faces that it happens to cross are strewn over its slab, at any angle to it.
+  // In the plane nothing but the distance tells, and outliers fill the slab of a true circle as well.
+  if (points_.dimension() != 3) return 1;
+  const float half = 0.5F * tau_;
+  double all = 0, inner = 0;
+  std::vector<float> room;
+  const std::span<const float> distances = levelled(candidate.distances, room);
+  for (const std::uint32_t i : part_.index()) {
+    if (!(candidate.distances[i] < caps_[i])) continue;
+    ++all;
+    inner += distances[i] < half ? 1 : 0;
+  }
+  return inner / std::max(1.0, all) * agreement(candidate.kind, candidate.theta, caps_, candidate.distances);
 }
 
 double MultiModel::saving(std::size_t kind, const models::Position& theta, std::span<const float> caps,
@@ -107,17 +125,22 @@ Expected<bool> MultiModel::challenge(const Candidate& winner, Candidate& challen
 }
 
 Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat) {
-  constexpr int kFlats = 2;  // a curved model along both sides of an edge is two flat ones
+  // A curved model along both sides of an edge is two flat ones; about a box it is as many as the box has faces along it.
+  constexpr int kFlats = 2, kFaces = 4;
   const std::size_t kind = flat_kind(winner.kind);
   std::vector<float> caps = own_caps(caps_, winner.distances), distances(caps.size());
   const double own = worth(saving(winner.kind, winner.theta, caps, winner.distances), space(winner.kind).freedom());
+  const double share = gathered(winner);
+  const bool loose = share < kGathered;
+  const int most = share < kWellGathered ? kFaces : kFlats;
   double together = 0;
-  for (int flats = 1; flats <= kFlats; ++flats) {
+  for (int flats = 1; flats <= most; ++flats) {
     models::Position theta;
     auto there = best_on(kind, caps, theta, distances);
     if (!there) return there;
-    if (!*there) return true;
+    if (!*there) return !loose;
     if (flats == 1) flat = theta;
+    if (loose) return false;
     together += saving(kind, theta, caps, distances);
     const double theirs = worth(together, flats * space(kind).freedom());
     if (own <= kClearly * theirs) return false;
@@ -148,6 +171,7 @@ Expected<MultiModel::Outcome> MultiModel::look_flat(Candidate& best, Outcome oth
 
 Expected<MultiModel::Outcome> MultiModel::flatten(Candidate& winner, models::Position flat) {
   winner.kind = flat_kind(winner.kind);
+  if (flat.size() == 0) return Outcome::unpaid;
   winner.theta = std::move(flat);
   if (auto done = refine(winner); !done) return tl::unexpected(done.error());
   if (!pays(winner.support, kinds_[winner.kind].settings, space(winner.kind).minimal_sample())) return Outcome::unpaid;

@@ -71,7 +71,7 @@ Expected<> check_points(const PointsView& points, const models::WorkingPoints& w
 
 /// Whose samples ask most of a cloud.
 const models::ModelSpace& keenest(std::span<const swarm::Kind> kinds) {
-  const auto keen = std::find_if(kinds.begin(), kinds.end(), [](const swarm::Kind& kind) { return kind.space->needs_normals(); });
+  const auto keen = std::find_if(kinds.begin(), kinds.end(), [](const swarm::Kind& kind) { return kind.space->agrees_by_normals(); });
   return *(keen == kinds.end() ? kinds.front() : *keen).space;
 }
 

@@ -191,6 +191,12 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
         return done;
       continue;
     }
+    if (*outcome == Outcome::rejected) {
+      constexpr int kNoTail = 1;
+      swarm::deflate(best.distances, tau_, kNoTail, settings_.dead_zone_slope, caps_, allowed_);
+      if (auto done = show(caps_); !done) return done;
+      continue;
+    }
     if (std::exchange(eager_, false)) continue;  // what is not found at once is looked for at length
     if (settings_.deflation == Deflation::parametric) landscapes_[best.kind].deflate_around(best.theta);
     if (*outcome == Outcome::complete) {
@@ -310,7 +316,18 @@ Expected<MultiModel::Outcome> MultiModel::search(const Seeds& seeds, Candidate& 
     reached = std::max(reached, *outcome);
   }
   if (reached != Outcome::interrupted) stop_reason_.clear();
-  if (kinds_.size() > 1 && reached == Outcome::found) return contest(best);
+  if (kinds_.size() > 1 && reached == Outcome::found) {
+    Candidate rejected = best;
+    auto contested = contest(best);
+    if (!contested || *contested != Outcome::unpaid || points_.dimension() != 3) return contested;
+    // What seemed to pay is nothing of its own. Something flat may be in the way; else its points are, and the search goes on elsewhere.
+    if (kinds_.back().hidden) {
+      auto flat = look_flat(best, Outcome::unpaid);
+      if (!flat || *flat != Outcome::unpaid) return flat;
+    }
+    best = std::move(rejected);
+    return Outcome::rejected;
+  }
   if (kinds_.back().hidden && reached <= Outcome::unpaid) return look_flat(best, reached);
   return reached;
 }

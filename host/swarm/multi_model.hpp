@@ -69,7 +69,7 @@ class MultiModel {
   const std::vector<std::uint16_t>& labels() const noexcept { return labels_; }
 
  private:
-  enum class Outcome { interrupted, unpaid, complete, flat, found };
+  enum class Outcome { interrupted, unpaid, complete, rejected, flat, found };
 
   /// What a swarm came to.
   struct Candidate {
@@ -168,6 +168,8 @@ class MultiModel {
   double worth(double saved, int freedom) const;
   /// Share of a model's points whose surface lies along it; 1 where normals are not known.
   double agreement(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
+  /// Share of a model's points that lie along it and in the inner half of its slab.
+  double gathered(const Candidate& candidate) const;
   /// Sum over points of what a model saves, as far as they lie along it [data unit].
   double saving(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
   std::size_t flat_kind(std::size_t curved) const noexcept;

@@ -137,8 +137,8 @@ Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space
   constexpr std::size_t kNeighbours = 16;
   Part part{Subset(points, random, size), {}};
   const bool correspondences = points.dimension() > 3;
-  if (correspondences || space.needs_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
-  if (space.needs_normals()) {
+  if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
+  if (space.agrees_by_normals()) {
     std::vector<Eigen::Vector3f> normals;
     models::estimate_normals(points, part.points.index(), part.neighbours, normals);
     points.set_normals(std::move(normals));

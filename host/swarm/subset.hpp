@@ -62,7 +62,7 @@ struct Part {
 };
 
 /// A part of `size` points at most, with neighbourhoods where the kind has use for them. Gives `points` the normals of the part where
-/// minimal samples of the kind look at them.
+/// the kind looks at them.
 Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size);
 
 }  // namespace swarmfit::swarm
