@@ -90,7 +90,7 @@ class Run {
     std::vector<kernels::ModelView> models;
     for (const auto& row : rows) models.push_back({kernels::ModelKind::plane, row});
     std::vector<kernels::Evidence> evidence(models.size());
-    if (!models.empty()) take(evaluator_.claim(view(all_), tau_, models, found.labels, evidence));
+    if (!models.empty()) take(evaluator_.claim(view(all_), {&tau_, 1}, models, found.labels, evidence));
     return found;
   }
 
