@@ -539,6 +539,7 @@ const CpuKernels& kernel_table() {
                                 distances,
                                 keep_nearest,
                                 split,
+                                narrow,
                                 sum_all,
                                 weigh,
                                 begin_claim,

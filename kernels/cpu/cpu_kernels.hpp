@@ -124,6 +124,9 @@ struct CpuKernels {
   void (*split)(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, float limit, const float* caps,
                 std::size_t at, Strip& strip, std::uint64_t* finite);
 
+  /// Tight rows of `dimension` doubles, less the pivot, as floats: finite stays finite, anything else becomes NaN.
+  void (*narrow)(const double* rows, std::size_t dimension, std::size_t count, const double* pivot, float* out);
+
   /// Of all finite points, each with weight 1; in double, so that the moments tell a plane from a line.
   void (*sum_all)(const Strip& strip, std::size_t dimension, StripSums& sums);
 

@@ -75,6 +75,7 @@ struct Bench {
   Pivot pivot;
   std::array<std::uint64_t, kStripWords> finite;
   std::array<float, kStripPoints * kMaxDimension> rows;
+  std::array<double, kStripPoints * kMaxDimension> wide;
   std::size_t first = 0, count = 0;
   std::array<Piece, kStripWords> pieces;
   std::size_t piece_count = 0;
@@ -197,14 +198,14 @@ struct Bench {
     for (std::size_t d = 0; d < static_cast<std::size_t>(points.dimension); ++d) origin[d] = static_cast<float>(pivot[d]);
     if constexpr (!std::is_same_v<S, float>) origin = {};  // taken off while rows are narrowed
     for (const Piece& piece : std::span(pieces).first(piece_count)) {
-      kernels.split(tight_rows<S>(points, piece), static_cast<std::size_t>(points.dimension), piece.count, origin.data(), limit,
+      kernels.split(tight_rows<S>(kernels, points, piece), static_cast<std::size_t>(points.dimension), piece.count, origin.data(), limit,
                     caps.empty() ? nullptr : caps.data() + piece.row, piece.at, strip, finite.data() + piece.at / kWordBits);
     }
   }
 
   /// The caller's own memory where rows lie there one beside the other, else a copy.
   template <class S>
-  const float* tight_rows(const PointsView& points, const Piece& piece) {
+  const float* tight_rows(const CpuKernels& kernels, const PointsView& points, const Piece& piece) {
     const auto width = static_cast<std::size_t>(points.dimension);
     const char* from = static_cast<const char*>(points.data) + (first + piece.row) * points.stride;
     if constexpr (std::is_same_v<S, float>) {
@@ -214,26 +215,15 @@ struct Bench {
       for (std::size_t i = 0; i < piece.count; ++i, from += points.stride)
         std::memcpy(rows.data() + i * width, from, width * sizeof(float));
     } else {
-      if (width == 2) narrow_rows<2>(from, points.stride, piece.count);
-      if (width == 3) narrow_rows<3>(from, points.stride, piece.count);
-      if (width == 4) narrow_rows<4>(from, points.stride, piece.count);
+      const double* tight = reinterpret_cast<const double*>(from);
+      if (points.stride != width * sizeof(double) || reinterpret_cast<std::uintptr_t>(from) % alignof(double) != 0) {
+        for (std::size_t i = 0; i < piece.count; ++i, from += points.stride)
+          std::memcpy(wide.data() + i * width, from, width * sizeof(double));
+        tight = wide.data();
+      }
+      kernels.narrow(tight, width, piece.count, pivot.data(), rows.data());
     }
     return rows.data();
-  }
-
-  /// Doubles about the pivot as floats: finite stays finite, anything else becomes NaN.
-  template <std::size_t Width>
-  void narrow_rows(const char* from, std::size_t stride, std::size_t number) {
-    constexpr double kMost = std::numeric_limits<float>::max();
-    for (std::size_t i = 0; i < number; ++i, from += stride) {
-      double row[Width];
-      std::memcpy(row, from, sizeof row);
-      for (std::size_t d = 0; d < Width; ++d) {
-        const double v = row[d] - pivot[d];
-        const double low = v < kMost ? v : kMost, both = low > -kMost ? low : -kMost;
-        rows[i * Width + d] = static_cast<float>(both + (v - v));  // v - v is 0 for what is finite
-      }
-    }
   }
 };
 

@@ -90,6 +90,36 @@ void split(const float* rows, std::size_t dimension, std::size_t count, const fl
 }
 
 template <std::size_t D>
+HWY_INLINE void narrow_of(const double* HWY_RESTRICT rows, std::size_t count, const double* HWY_RESTRICT pivot, float* HWY_RESTRICT out) {
+  const hn::ScalableTag<double> d;
+  const hn::Rebind<float, hn::ScalableTag<double>> narrow;
+  constexpr std::size_t L = HWY_LANES(double);
+  // The pivot as the columns of D vectors of rows have it, one after the other.
+  HWY_ALIGN double pattern[D * L];
+  for (std::size_t i = 0; i < D * L; ++i) pattern[i] = pivot[i % D];
+  const auto most = hn::Set(d, static_cast<double>(std::numeric_limits<float>::max()));
+  const auto one = [&](const double* from, std::size_t phase) HWY_ATTR {
+    const auto v = hn::Sub(hn::LoadU(d, from), hn::Load(d, pattern + phase * L));
+    const auto held = hn::Max(hn::Min(v, most), hn::Neg(most));
+    return hn::DemoteTo(narrow, hn::Add(held, hn::Sub(v, v)));  // v - v is 0 for what is finite
+  };
+  const std::size_t all = D * count, whole = all - all % (D * L);
+  for (std::size_t i = 0; i < whole; i += D * L) {
+    for (std::size_t phase = 0; phase < D; ++phase) hn::StoreU(one(rows + i + phase * L, phase), narrow, out + i + phase * L);
+  }
+  HWY_ALIGN double last[D * L];
+  HWY_ALIGN float last_out[D * L];
+  std::fill(last, last + D * L, 0.0);
+  std::copy(rows + whole, rows + all, last);
+  for (std::size_t phase = 0; phase < D; ++phase) hn::StoreU(one(last + phase * L, phase), narrow, last_out + phase * L);
+  std::copy(last_out, last_out + (all - whole), out + whole);
+}
+
+void narrow(const double* rows, std::size_t dimension, std::size_t count, const double* pivot, float* out) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { narrow_of<D>(rows, count, pivot, out); });
+}
+
+template <std::size_t D>
 HWY_INLINE void load_columns(const Strip& strip, std::size_t i, Vector* x) {
   for (std::size_t c = 0; c < D; ++c) x[c] = hn::Load(FloatTag(), strip.columns[c].data() + i);
 }
