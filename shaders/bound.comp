@@ -1,10 +1,13 @@
-// Before a pruned swarm's costs: a lower bound of each, by the balls that hold the chunks. One group a model.
+// Before a pruned swarm's costs: a lower bound of each, by the balls that hold the chunks. One group a model; the first one also empties
+// the list that select.comp is about to fill.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common.glsl"
 #include "bounds.glsl"
 
 layout(constant_id = kSpecLoss) const uint kLoss = 0;
+
+layout(set = 0, binding = kBindWork, std430) writeonly buffer Work { uint work[]; };
 
 shared float sums[gl_WorkGroupSize.x];
 
@@ -14,6 +17,7 @@ void main() {
   const uint model = gl_WorkGroupID.x;
   float k[kCoefficientStride];
   load_model(model, k);
+  if (model == 0 && lane < kWorkHead) work[lane] = lane == 2 ? 1 : 0;  // 0 x 0 x 1 groups, and no tile
 
   float sum = 0.0;
   for (uint quad = lane; quad < push.bound_stride / kQuad; quad += group) {

@@ -1,7 +1,6 @@
 // First pass of a swarm's costs: each group sums the loss of kTile particles over one chunk of points,
 // kSpecGroup x kWork quads. Coefficients and sums stay in registers; every sum is taken in a fixed order.
-// Pruned, a group looks at kSpan particles: of those whose every point here is beyond its cap the sums are those of the caps, of those
-// that cannot come below their cutoff nobody asks, and the others are taken kTile at a time.
+// Pruned, the tiles are those that select.comp has left, whichever group takes them.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common.glsl"
@@ -10,11 +9,8 @@ layout(constant_id = kSpecLoss) const uint kLoss = 0;
 layout(constant_id = kSpecTile) const uint kTile = 8;
 layout(constant_id = kSpecWork) const uint kWork = 8;
 #ifdef SWARMFIT_PRUNED
-#include "bounds.glsl"
-layout(constant_id = kSpecSpan) const uint kSpan = 64;
-shared uint is_open[kSpan / 32];
-shared uint open[kSpan];
-#define PARTICLE(at) open[min(at, end - 1)]
+layout(set = 0, binding = kBindWork, std430) readonly buffer Work { uint work[]; };
+#define PARTICLE(at) work[min(at, end - 1)]
 #else
 #define PARTICLE(at) (at)
 #endif
@@ -85,50 +81,13 @@ void add_up(uint chunk, uint first, uint end) {
 }
 
 #ifdef SWARMFIT_PRUNED
-// The partial sums that the chunk's caps leave, as add_up would.
-void add_caps(uint chunk, uint particle) {
-  const uint own = push.partials / gl_NumWorkGroups.x;  // partial sums of a chunk
-  const uint first = kBoundColumns * push.bound_stride + (kLoss == kLossL2 ? push.partials : 0) + chunk * own;
-  for (uint i = first; i < first + own; ++i) partials[particle * push.partials + chunk * own + (i - first)] = bounds[i / 4][i % 4];
-}
-
 void main() {
-  const uint group = gl_WorkGroupSize.x;
-  const uint lane = gl_LocalInvocationID.x;
-  const uint chunk = gl_WorkGroupID.x;
-  if (lane < kSpan / 32) is_open[lane] = 0;
-  barrier();
-  for (uint i = lane; i < kSpan; i += group) {
-    const uint particle = gl_WorkGroupID.y * kSpan + i;
-    if (particle >= push.models) break;
-    float k[kCoefficientStride];
-    load_model(particle, k);
-    if (lower[particle] >= k[kCutoffSlot]) continue;
-    const float most = four_bounds(kBoundMostCap, chunk / kQuad)[chunk % kQuad];
-    if (most == 0.0 || nearest_of(chunk / kQuad, k)[chunk % kQuad] > most) {
-      add_caps(chunk, particle);
-    } else {
-      atomicOr(is_open[i / 32], 1u << (i % 32));
-    }
-  }
-  barrier();
-  uint count = 0;
-  for (uint w = 0; w < kSpan / 32; ++w) {
-    // In their order, whoever came first.
-    for (uint bit = lane; bit < 32; bit += group) {
-      if ((is_open[w] >> bit & 1u) == 0) continue;
-      open[count + bitCount(is_open[w] & ((1u << bit) - 1u))] = gl_WorkGroupID.y * kSpan + w * 32 + bit;
-    }
-    count += bitCount(is_open[w]);
-  }
-  barrier();
-  if (lane == 0) atomicAdd(looked_into, count);
-  for (uint first = 0; first < count; first += kTile) {
-    add_up(chunk, first, count);
-#ifndef SWARMFIT_TEXELS
-    barrier();
-#endif
-  }
+  const uint tile = gl_WorkGroupID.y * kTilesAcross + gl_WorkGroupID.x;
+  if (tile >= work[kWorkTiles]) return;
+  const uint at = kWorkHead + push.chunks * push.models + 2 * tile;
+  const uint chunk = work[at];
+  const uint first = kWorkHead + chunk * push.models + (work[at + 1] >> kTileBits);
+  add_up(chunk, first, first + (work[at + 1] & ((1u << kTileBits) - 1u)));
 }
 #else
 void main() {

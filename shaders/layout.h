@@ -19,13 +19,14 @@ SWARMFIT_CONST kBindPartials = 3;      // [model][partial sum]; distances and la
 SWARMFIT_CONST kBindCosts = 4;         // [model]
 SWARMFIT_CONST kBindBounds = 5;        // of chunks: columns of push.bound_stride floats, then partial sums of the caps, L1 and L2
 SWARMFIT_CONST kBindLower = 6;         // pairs of a chunk and a model that were looked into; then a lower bound of each model's cost
-SWARMFIT_CONST kStorageBindings = 7;
+SWARMFIT_CONST kBindWork = 7;          // pruned: what is left to compute, see below
+SWARMFIT_CONST kStorageBindings = 8;
 // The first four once more, as texel buffers, four floats a texel: see fetch.glsl.
-SWARMFIT_CONST kBindPointTexels = 7;
-SWARMFIT_CONST kBindCapTexels = 8;
-SWARMFIT_CONST kBindCoefficientTexels = 9;
-SWARMFIT_CONST kBindPartialTexels = 10;
-SWARMFIT_CONST kBindingCount = 11;
+SWARMFIT_CONST kBindPointTexels = 8;
+SWARMFIT_CONST kBindCapTexels = 9;
+SWARMFIT_CONST kBindCoefficientTexels = 10;
+SWARMFIT_CONST kBindPartialTexels = 11;
+SWARMFIT_CONST kBindingCount = 12;
 
 // Specialisation constants.
 SWARMFIT_CONST kSpecGroup = 0;      // invocations in a group: the subgroup's size or a multiple of it
@@ -34,7 +35,7 @@ SWARMFIT_CONST kSpecLoss = 2;       // a Loss
 SWARMFIT_CONST kSpecDimension = 3;  // columns of a point
 SWARMFIT_CONST kSpecTile = 4;       // particles held by an invocation
 SWARMFIT_CONST kSpecWork = 5;       // quads (four points) an invocation goes through
-SWARMFIT_CONST kSpecSpan = 6;       // pruned: models that a group of invocations looks at; a multiple of 32
+SWARMFIT_CONST kSpecSpan = 6;       // select: models that a group of invocations looks at; a multiple of 32
 SWARMFIT_CONST kSpecCount = 7;
 
 SWARMFIT_CONST kAnyModel = 0xFFFFFFFFu;
@@ -57,12 +58,20 @@ SWARMFIT_CONST kBoundCapSum = 6;   // sum of its caps; then of their squares
 SWARMFIT_CONST kBoundAxes = 8;     // of a box about the mean: half an edge after the other, as many columns each as a point has
 SWARMFIT_CONST kBoundColumns = 17;
 
+// What a pruned swarm leaves to compute, in words: the arguments of an indirect dispatch, how many tiles it has, then a row a chunk of the
+// models that are open there, push.models wide, then two words a tile: its chunk, and (place in the row << kTileBits | models in it).
+SWARMFIT_CONST kWorkTiles = 3;
+SWARMFIT_CONST kWorkHead = 4;
+SWARMFIT_CONST kTileBits = 8;
+SWARMFIT_CONST kTilesAcross = 32768;  // groups along x; more tiles go on along y
+
 struct Push {
   uint column_stride;  // points in a column, padding included; a multiple of kQuad
   uint partials;       // partial sums of a particle: one a chunk of points, or one an invocation of a chunk
   uint models;         // assign, pruned: how many
   float tolerance;     // assign: for all points; negative where each has its own
   uint bound_stride;   // chunks, padded to a multiple of kQuad
+  uint chunks;         // pruned: of the points
 };
 
 #ifdef __cplusplus

@@ -103,6 +103,43 @@ TEST_P(VulkanDevices, PruningChangesNoCost) {
   }
 }
 
+/// Tiles of open particles: of several spans, and, where tiles are small, more than one row of an indirect dispatch has.
+TEST_P(VulkanDevices, ManyOpenTilesAreAllDone) {
+  constexpr std::size_t kModels = 2600;
+  EvaluatorOptions options = GetParam().options;
+  const auto pruned = make(options);
+  options.pruning = false;
+  const auto all = make(options);
+  ASSERT_TRUE(pruned && all);
+  Cloud cloud = make_cloud(ModelKind::cylinder, 60001);
+  // Every chunk is near every model.
+  std::fill(cloud.caps.begin(), cloud.caps.end(), 50.0F);
+  const std::vector<double> swarm = make_swarm(ModelKind::cylinder, kModels);
+  PointsView view = cloud.view();
+  view.ordered = true;
+  std::vector<float> exact(kModels), found(kModels), again(kModels);
+  for (FitnessEvaluator* one : {pruned.get(), all.get()}) {
+    ASSERT_OK(one->set_points(view));
+    ASSERT_OK(one->set_caps(cloud.caps));
+  }
+  ASSERT_OK(all->evaluate({ModelKind::cylinder, kModels, swarm}, Loss::truncated_l1, {}, exact));
+  ASSERT_OK(pruned->evaluate({ModelKind::cylinder, kModels, swarm}, Loss::truncated_l1, {}, found));
+  EXPECT_EQ(pruned->effort().touched, pruned->effort().point_models);
+  EXPECT_EQ(found, exact);
+  // A list that is used again starts from nothing, whatever place a chunk's tiles had before.
+  const SwarmView few{ModelKind::cylinder, 300, std::span(swarm).first(300 * swarm.size() / kModels)};
+  exact.resize(few.count);
+  again.resize(few.count);
+  std::fill(cloud.caps.begin(), cloud.caps.end(), 0.01F);
+  for (FitnessEvaluator* one : {pruned.get(), all.get()}) ASSERT_OK(one->set_caps(cloud.caps));
+  ASSERT_OK(all->evaluate(few, Loss::truncated_l1, {}, exact));
+  for (int run = 0; run < 2; ++run) {
+    ASSERT_OK(pruned->evaluate(few, Loss::truncated_l1, {}, again));
+    EXPECT_EQ(again, exact);
+  }
+  EXPECT_LT(pruned->effort().touched, pruned->effort().point_models);
+}
+
 TEST_P(VulkanDevices, SmallStorageRangesSplitTheCloud) {
   EvaluatorOptions options = GetParam().options;
   for (const std::size_t range : {16384, 50000, 1000000}) {

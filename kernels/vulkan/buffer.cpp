@@ -30,7 +30,7 @@ std::uint32_t memory_type(const vk::PhysicalDeviceMemoryProperties& memory, std:
 
 vk::BufferUsageFlags usage(const DeviceTraits& device) {
   using Usage = vk::BufferUsageFlagBits;
-  const vk::BufferUsageFlags storage = Usage::eStorageBuffer | Usage::eTransferDst | Usage::eTransferSrc;
+  const vk::BufferUsageFlags storage = Usage::eStorageBuffer | Usage::eTransferDst | Usage::eTransferSrc | Usage::eIndirectBuffer;
   return device.texels ? storage | Usage::eUniformTexelBuffer : storage;
 }
 

@@ -20,9 +20,18 @@ constexpr std::size_t kRowFloats = 64;  // rows of costs start 256 bytes apart, 
 constexpr std::size_t kMostRecorded = 64;
 constexpr std::size_t kLowerHead = 4;  // words before the lower bounds
 
+/// Words of work that a pruned swarm may leave (shaders/layout.h). Tiles hold four models at least, and spans are whole tiles of four.
+std::size_t work_words(std::size_t chunks, std::size_t models) { return layout::kWorkHead + chunks * (models + 2 * (models / 4 + 1)); }
+/// Models whose work fits so many bytes.
+std::size_t most_open(std::size_t bytes, std::size_t chunks) {
+  const std::size_t words = bytes / sizeof(std::uint32_t) / std::max<std::size_t>(chunks, 1);
+  constexpr std::size_t kRest = layout::kWorkHead + 2;
+  return words > kRest ? (words - kRest) * 2 / 3 : 1;
+}
+
 std::uint32_t reduce_group(const DeviceTraits& device) { return device.software ? device.subgroup : std::min(64U, device.group_limit); }
 
-void wait_for(const vk::raii::CommandBuffer& commands, vk::AccessFlags access, Stage stage) {
+void wait_for(const vk::raii::CommandBuffer& commands, vk::AccessFlags access, vk::PipelineStageFlags stage) {
   const vk::MemoryBarrier written(Access::eShaderWrite, access);
   commands.pipelineBarrier(Stage::eComputeShader, stage, {}, written, {}, {});
 }
@@ -59,6 +68,11 @@ std::size_t Commands::swarm_limit() const {
   std::size_t limit = std::min(traits.storage_range / kModelBytes, traits.storage_range / (sizeof(float) * largest));
   limit = std::min(limit, kPartialsLimit / (sizeof(float) * std::max<std::size_t>(sums, 1)));
   limit = std::min<std::size_t>({limit, traits.grid_limit[0], traits.grid_limit[1]});
+  if (cloud_->bounded()) {
+    std::uint32_t most = 0;
+    for (const Segment& segment : cloud_->segments()) most = std::max(most, segment.chunks);
+    limit = std::min(limit, most_open(traits.storage_range, most));
+  }
   const std::size_t tile = largest_tile(traits);
   return std::max(limit / tile, std::size_t{1}) * tile;
 }
@@ -80,6 +94,10 @@ void Commands::reserve_particles(std::uint32_t particles) {
   }
   lower_.resize(cloud_->segments().size());
   for (Buffer& lower : lower_) lower.reserve(device_, sizeof(float) * (kLowerHead + particles), Residence::readback);
+  work_.resize(cloud_->bounded() ? cloud_->segments().size() : 0);
+  for (std::size_t s = 0; s < work_.size(); ++s) {
+    work_[s].reserve(device_, sizeof(std::uint32_t) * work_words(cloud_->segments()[s].chunks, particles), Residence::device);
+  }
   room_ = particles;
   bind_costs();
 }
@@ -91,8 +109,11 @@ void Commands::bind_costs() {
     const vk::DescriptorBufferInfo costs(costs_.handle(), sizeof(float) * cost_offset(s), sizeof(float) * cost_stride_);
     // A cloud without bounds has something in their place, which no shader looks at.
     const Buffer& bounds = cloud_->bounded() ? segment.bounds : lower_[s];
-    const std::array<vk::DescriptorBufferInfo, 3> buffers{
-        {costs, {bounds.handle(), 0, VK_WHOLE_SIZE}, {lower_[s].handle(), 0, VK_WHOLE_SIZE}}};
+    const Buffer& work = cloud_->bounded() ? work_[s] : lower_[s];
+    const std::array<vk::DescriptorBufferInfo, 4> buffers{{costs,
+                                                           {bounds.handle(), 0, VK_WHOLE_SIZE},
+                                                           {lower_[s].handle(), 0, VK_WHOLE_SIZE},
+                                                           {work.handle(), 0, VK_WHOLE_SIZE}}};
     device_.handle().updateDescriptorSets(
         vk::WriteDescriptorSet(*cost_sets_[s], layout::kBindCosts, 0, vk::DescriptorType::eStorageBuffer, {}, buffers), {});
   }
@@ -118,18 +139,18 @@ void Commands::bind_set(vk::DescriptorSet set, const Segment& segment, const Buf
       vk::WriteDescriptorSet(set, layout::kBindPointTexels, 0, vk::DescriptorType::eUniformTexelBuffer, {}, {}, views), {});
 }
 
-/// A dispatch over each segment's cost set, of as many groups along x and y as groups(segment) says.
-template <class Groups>
-void Commands::record_each(const vk::raii::CommandBuffer& commands, vk::Pipeline pipeline, std::uint32_t models, Groups&& groups) const {
+/// dispatch(segment's number) with each segment's cost set bound.
+template <class Dispatch>
+void Commands::record_each(const vk::raii::CommandBuffer& commands, vk::Pipeline pipeline, std::uint32_t models,
+                           Dispatch&& dispatch) const {
   const vk::PipelineLayout layout = pipelines_.layout();
   commands.bindPipeline(vk::PipelineBindPoint::eCompute, pipeline);
   for (std::size_t s = 0; s < cost_sets_.size(); ++s) {
     const Segment& segment = cloud_->segments()[s];
-    const layout::Push push{segment.stride, segment.sums, models, 0, segment.known.stride()};
+    const layout::Push push{segment.stride, segment.sums, models, 0, segment.known.stride(), segment.chunks};
     commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *cost_sets_[s], {});
     commands.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
-    const auto [x, y] = groups(segment);
-    commands.dispatch(x, y, 1);
+    dispatch(s);
   }
 }
 
@@ -142,9 +163,9 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
 
   vk::raii::CommandBuffer commands = device_.allocate_commands();
   commands.begin(vk::CommandBufferBeginInfo());
-  record_each(commands, cost, 0, [&](const Segment& segment) { return Grid(segment.chunks, shape.tiles); });
+  record_each(commands, cost, 0, [&](std::size_t s) { commands.dispatch(cloud_->segments()[s].chunks, shape.tiles, 1); });
   wait_for(commands, Access::eShaderRead, Stage::eComputeShader);
-  record_each(commands, reduce, 0, [&](const Segment&) { return Grid(shape.padded(), 1); });
+  record_each(commands, reduce, 0, [&](std::size_t) { commands.dispatch(shape.padded(), 1, 1); });
   wait_for(commands, Access::eHostRead, Stage::eHost);
   commands.end();
   return commands;
@@ -152,6 +173,7 @@ vk::raii::CommandBuffer Commands::record_costs(ModelKind kind, Loss loss, const 
 
 vk::raii::CommandBuffer Commands::record_pruned(ModelKind kind, Loss loss, const TileShape& shape, std::size_t models) const {
   const ChunkShape& chunk = cloud_->shape();
+  const std::uint32_t span = span_shape(models);
   Specialisation wanted{.shader = Shader::bound,
                         .group = reduce_group(device_.traits()),
                         .model = static_cast<std::uint32_t>(kind),
@@ -159,21 +181,28 @@ vk::raii::CommandBuffer Commands::record_pruned(ModelKind kind, Loss loss, const
                         .dimension = static_cast<std::uint32_t>(dimension_)};
   const vk::Pipeline bound = pipelines_.get(wanted);
   const vk::Pipeline reduce = pipelines_.get({.shader = Shader::reduce_pruned, .group = reduce_group(device_.traits())});
+  wanted.shader = Shader::select;
+  wanted.tile = shape.tile;
+  wanted.span = span;
+  const vk::Pipeline select = pipelines_.get(wanted);
   wanted.shader = Shader::cost_pruned;
   wanted.group = chunk.group;
-  wanted.tile = shape.tile;
   wanted.work = chunk.work;
-  wanted.span = kSpan;
   const vk::Pipeline cost = pipelines_.get(wanted);
 
   vk::raii::CommandBuffer commands = device_.allocate_commands();
   commands.begin(vk::CommandBufferBeginInfo());
   const auto count = static_cast<std::uint32_t>(models);
-  record_each(commands, bound, count, [&](const Segment&) { return Grid(count, 1); });
+  record_each(commands, bound, count, [&](std::size_t) { commands.dispatch(count, 1, 1); });
   wait_for(commands, Access::eShaderRead | Access::eShaderWrite, Stage::eComputeShader);
-  record_each(commands, cost, count, [&](const Segment& segment) { return Grid(segment.chunks, (count + kSpan - 1) / kSpan); });
+  record_each(commands, select, count, [&](std::size_t s) {
+    commands.dispatch(cloud_->segments()[s].known.stride() / layout::kQuad, (count + span - 1) / span, 1);
+  });
+  wait_for(commands, Access::eShaderRead | Access::eShaderWrite | Access::eIndirectCommandRead,
+           Stage::eComputeShader | Stage::eDrawIndirect);
+  record_each(commands, cost, count, [&](std::size_t s) { commands.dispatchIndirect(work_[s].handle(), 0); });
   wait_for(commands, Access::eShaderRead, Stage::eComputeShader);
-  record_each(commands, reduce, count, [&](const Segment&) { return Grid(count, 1); });
+  record_each(commands, reduce, count, [&](std::size_t) { commands.dispatch(count, 1, 1); });
   wait_for(commands, Access::eHostRead, Stage::eHost);
   commands.end();
   return commands;
@@ -203,7 +232,7 @@ void Commands::costs(ModelKind kind, int coefficients, Loss loss, std::span<floa
 
 std::uint64_t Commands::pruned_costs(ModelKind kind, int coefficients, Loss loss, std::span<float> costs) {
   // Full tiles, but for a small swarm: how many particles are open is known on the device alone.
-  const TileShape shape = tile_shape(device_.traits(), std::min<std::size_t>(costs.size(), kSpan), coefficients);
+  const TileShape shape = tile_shape(device_.traits(), std::min<std::size_t>(costs.size(), largest_tile(device_.traits())), coefficients);
   reserve_particles(static_cast<std::uint32_t>(costs.size()));
   for (Buffer& lower : lower_) lower.as<std::uint32_t>()[0] = 0;
   run_costs({kind, loss, shape.tile, 0, costs.size()}, costs, [&] { return record_pruned(kind, loss, shape, costs.size()); });
@@ -233,7 +262,7 @@ void Commands::run_map(const Specialisation& wanted, std::size_t models, float t
   once_.bindPipeline(vk::PipelineBindPoint::eCompute, pipelines_.get(wanted));
   for (std::size_t s = 0; s < map_sets_.size(); ++s) {
     const Segment& segment = cloud_->segments()[s];
-    const layout::Push push{segment.stride, segment.sums, static_cast<std::uint32_t>(models), tolerance, 0};
+    const layout::Push push{segment.stride, segment.sums, static_cast<std::uint32_t>(models), tolerance, 0, 0};
     once_.bindDescriptorSets(vk::PipelineBindPoint::eCompute, layout, 0, *map_sets_[s], {});
     once_.pushConstants<layout::Push>(layout, vk::ShaderStageFlagBits::eCompute, 0, push);
     once_.dispatch((segment.stride / layout::kQuad + wanted.group - 1) / wanted.group, 1, 1);

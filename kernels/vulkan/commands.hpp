@@ -3,7 +3,6 @@
 
 #include <map>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "kernels/vulkan/cloud.hpp"
@@ -48,9 +47,8 @@ class Commands {
   void bind_costs();
   void bind_map(bool own_tolerance);
   void bind_set(vk::DescriptorSet set, const Segment& segment, const Buffer& caps, const Buffer& out) const;
-  using Grid = std::pair<std::uint32_t, std::uint32_t>;  // groups along x and y
-  template <class Groups>
-  void record_each(const vk::raii::CommandBuffer& commands, vk::Pipeline pipeline, std::uint32_t models, Groups&& groups) const;
+  template <class Dispatch>
+  void record_each(const vk::raii::CommandBuffer& commands, vk::Pipeline pipeline, std::uint32_t models, Dispatch&& dispatch) const;
   vk::raii::CommandBuffer record_costs(ModelKind kind, Loss loss, const TileShape& shape) const;
   vk::raii::CommandBuffer record_pruned(ModelKind kind, Loss loss, const TileShape& shape, std::size_t models) const;
   /// Runs what is recorded under this, or what `record` records, and adds up the segments' costs.
@@ -65,6 +63,7 @@ class Commands {
   int dimension_ = 0;
   Buffer coefficients_;
   std::vector<Buffer> lower_;  // a segment; see shaders/bounds.glsl
+  std::vector<Buffer> work_;   // a segment of a bounded cloud; see shaders/layout.h
   Buffer costs_;               // [segment][particle], rows cost_stride_ floats apart
   std::size_t cost_stride_ = 0;
   std::size_t room_ = 0;  // particles that partials and costs have room for

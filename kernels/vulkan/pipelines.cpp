@@ -24,6 +24,8 @@ namespace {
 #include "embedded/reduce_pruned.h"
 #include "embedded/reduce_pruned_texels.h"
 #include "embedded/reduce_texels.h"
+#include "embedded/select.h"
+#include "embedded/select_texels.h"
 #include "embedded/shader_models.h"
 
 using Spirv = std::span<const std::uint32_t>;
@@ -34,6 +36,7 @@ Spirv spirv(Shader shader, bool texels) {
     case Shader::reduce: return texels ? Spirv(reduce_texels_spirv) : Spirv(reduce_spirv);
     case Shader::distances: return texels ? Spirv(distances_texels_spirv) : Spirv(distances_spirv);
     case Shader::bound: return texels ? Spirv(bound_texels_spirv) : Spirv(bound_spirv);
+    case Shader::select: return texels ? Spirv(select_texels_spirv) : Spirv(select_spirv);
     case Shader::cost_pruned: return texels ? Spirv(cost_pruned_texels_spirv) : Spirv(cost_pruned_spirv);
     case Shader::reduce_pruned: return texels ? Spirv(reduce_pruned_texels_spirv) : Spirv(reduce_pruned_spirv);
     case Shader::assign: break;
@@ -64,8 +67,8 @@ bool has_shader(ModelKind kind) noexcept {
 
 Pipelines::Pipelines(const Device& device, const std::filesystem::path& cache_folder)
     : device_(device), cache_(device, cache_folder), set_layout_(make_set_layout(device)), layout_(make_layout(device, *set_layout_)) {
-  for (const Shader shader :
-       {Shader::cost, Shader::reduce, Shader::distances, Shader::assign, Shader::bound, Shader::cost_pruned, Shader::reduce_pruned}) {
+  for (const Shader shader : {Shader::cost, Shader::reduce, Shader::distances, Shader::assign, Shader::bound, Shader::select,
+                              Shader::cost_pruned, Shader::reduce_pruned}) {
     const Spirv code = spirv(shader, device.traits().texels);
     modules_.emplace_back(device.handle(), vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data()));
   }

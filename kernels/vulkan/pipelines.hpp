@@ -11,7 +11,7 @@
 
 namespace swarmfit::kernels::vulkan {
 
-enum class Shader : std::uint32_t { cost, reduce, distances, assign, bound, cost_pruned, reduce_pruned };
+enum class Shader : std::uint32_t { cost, reduce, distances, assign, bound, select, cost_pruned, reduce_pruned };
 
 /// What a pipeline is specialised for; see shaders/layout.h.
 struct Specialisation {

@@ -6,6 +6,8 @@
 namespace swarmfit::kernels::vulkan {
 namespace {
 
+constexpr std::uint32_t kLeastSpan = 64, kMostSpan = 256;  // with more, a few chunks would give too few groups
+
 std::uint32_t ceil_div(std::size_t a, std::size_t b) { return static_cast<std::uint32_t>((a + b - 1) / b); }
 
 }  // namespace
@@ -28,6 +30,8 @@ ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimen
   while (shape.work > 1 && shape.points() > columns) shape.work /= 2;
   return shape;
 }
+
+std::uint32_t span_shape(std::size_t particles) { return std::clamp<std::uint32_t>(ceil_div(particles, 32) * 32, kLeastSpan, kMostSpan); }
 
 TileShape tile_shape(const DeviceTraits& device, std::size_t particles, int coefficients) {
   TileShape shape;

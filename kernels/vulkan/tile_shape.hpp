@@ -24,8 +24,8 @@ struct TileShape {
 };
 TileShape tile_shape(const DeviceTraits& device, std::size_t particles, int coefficients);
 
-/// Particles that a group looks at in a pruned swarm: a multiple of 32, of which the open ones fill tiles.
-inline constexpr std::uint32_t kSpan = 64;
+/// Particles that a group looks at in a pruned swarm, of which the open ones fill tiles: a multiple of 32.
+std::uint32_t span_shape(std::size_t particles);
 
 /// Particles a tile may have at most; smaller ones divide it.
 std::uint32_t largest_tile(const DeviceTraits& device);
