@@ -11,13 +11,6 @@
 namespace swarmfit::kernels {
 namespace {
 
-bool contains_ignoring_case(std::string_view text, std::string_view part) {
-  const auto same = [](char a, char b) {
-    return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
-  };
-  return !part.empty() && std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
-}
-
 Result<Selection> selected(Result<std::unique_ptr<FitnessEvaluator>> made, std::string reason) {
   if (!made) return tl::unexpected(made.error());
   return Selection{std::move(*made), std::move(reason)};
@@ -52,6 +45,13 @@ Result<Selection> choose_automatically(const EvaluatorOptions& options) {
 }
 
 }  // namespace
+
+bool contains_ignoring_case(std::string_view text, std::string_view part) {
+  const auto same = [](char a, char b) {
+    return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
+  };
+  return !part.empty() && std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
+}
 
 std::vector<DeviceDescription> list_devices() {
   std::vector<DeviceDescription> all = cpu_devices();

@@ -42,6 +42,9 @@ struct Selection {
   std::string reason;  ///< why this one, for the result
 };
 
+/// Whether a device's name holds this part, upper case or lower; false for an empty part.
+bool contains_ignoring_case(std::string_view text, std::string_view part);
+
 /// `name`: auto, cpu, vulkan, reference, or (part of) a device's name as listed. Fails with `unavailable` or `invalid`.
 Result<Selection> make_evaluator(std::string_view name, const EvaluatorOptions& options);
 

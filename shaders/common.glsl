@@ -13,5 +13,8 @@ const uint kInfinityBits = 0x7F800000u;
 // a / b for a >= 0, infinite where b is not above 0.
 vec4 ratio(vec4 a, vec4 b) { return mix(vec4(uintBitsToFloat(kInfinityBits)), a / b, greaterThan(b, vec4(0.0))); }
 
+#ifdef SWARMFIT_BATCH
+#include "batch.glsl"
+#endif
 #include "fetch.glsl"
 #include "models.glsl"

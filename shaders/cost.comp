@@ -1,6 +1,6 @@
 // First pass of a swarm's costs: each group sums the loss of kTile particles over one chunk of points,
 // kSpecGroup x kWork quads. Coefficients and sums stay in registers; every sum is taken in a fixed order.
-// Pruned, the tiles are those that select.comp has left, whichever group takes them.
+// Pruned, the tiles are those that select.comp has left, whichever group takes them. In a batch, each problem has its own.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common.glsl"
@@ -10,9 +10,14 @@ layout(constant_id = kSpecTile) const uint kTile = 8;
 layout(constant_id = kSpecWork) const uint kWork = 8;
 #ifdef SWARMFIT_PRUNED
 layout(set = 0, binding = kBindWork, std430) readonly buffer Work { uint work[]; };
-#define PARTICLE(at) work[min(at, end - 1)]
+#define ROW(at) work[min(at, end - 1)]
+#define SUMS(at) (work[at] * push.partials)
+#elif defined(SWARMFIT_BATCH)
+#define ROW(at) (own.row + min(at, end - 1))
+#define SUMS(at) (own.sums + (at)*own.partials)
 #else
-#define PARTICLE(at) (at)
+#define ROW(at) (at)
+#define SUMS(at) ((at)*push.partials)
 #endif
 
 layout(set = 0, binding = kBindPartials, std430) writeonly buffer Partials { float partials[]; };
@@ -43,7 +48,7 @@ void add_up(uint chunk, uint first, uint end) {
   float sum[kTile];
   [[unroll]] for (uint t = 0; t < kTile; ++t) {
     float one[kCoefficientStride];
-    load_model(PARTICLE(first + t), one);
+    load_model(ROW(first + t), one);
     [[unroll]] for (uint i = 0; i < kCoefficientStride; ++i) k[t * kCoefficientStride + i] = one[i];
     sum[t] = 0.0;
   }
@@ -64,7 +69,7 @@ void add_up(uint chunk, uint first, uint end) {
 #ifdef SWARMFIT_TEXELS
   // Where an exchange between invocations is dearer than a few more partial sums, each leaves its own.
   [[unroll]] for (uint t = 0; t < kTile; ++t) {
-    if (first + t < end) partials[PARTICLE(first + t) * push.partials + chunk * group + lane] = sum[t];
+    if (first + t < end) partials[SUMS(first + t) + chunk * group + lane] = sum[t];
   }
 #else
   [[unroll]] for (uint t = 0; t < kTile; ++t) sums[t * group + lane] = sum[t];
@@ -76,7 +81,7 @@ void add_up(uint chunk, uint first, uint end) {
     }
     barrier();
   }
-  for (uint t = lane; t < kTile && first + t < end; t += group) partials[PARTICLE(first + t) * push.partials + chunk] = sums[t * group];
+  for (uint t = lane; t < kTile && first + t < end; t += group) partials[SUMS(first + t) + chunk] = sums[t * group];
 #endif
 }
 
@@ -88,6 +93,13 @@ void main() {
   const uint chunk = work[at];
   const uint first = kWorkHead + chunk * push.models + (work[at + 1] >> kTileBits);
   add_up(chunk, first, first + (work[at + 1] & ((1u << kTileBits) - 1u)));
+}
+#elif defined(SWARMFIT_BATCH)
+void main() {
+  take_item();
+  const uint tiles = (own.models + kTile - 1) / kTile;
+  if (gl_WorkGroupID.x >= own.chunks * tiles) return;
+  add_up(gl_WorkGroupID.x / tiles, gl_WorkGroupID.x % tiles * kTile, own.models);
 }
 #else
 void main() {

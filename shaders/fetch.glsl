@@ -18,12 +18,20 @@ layout(set = 0, binding = kBindCoefficients, std430) readonly buffer Coefficient
 #define FOUR_COEFFICIENTS(i) coefficients[i]
 #endif
 
+#ifdef SWARMFIT_BATCH
+#define COLUMN(c) (own.points + (c)*own.column)
+#define CAPS own.caps
+#else
+#define COLUMN(c) ((c) * (push.column_stride / kQuad))
+#define CAPS 0
+#endif
+
 // Quad q of the cloud: x[c] is column c of its four points.
 void load_quad(uint q, out vec4 x[kMaxColumns]) {
-  [[unroll]] for (uint c = 0; c < kDimension; ++c) x[c] = FOUR_POINTS(c * (push.column_stride / kQuad) + q);
+  [[unroll]] for (uint c = 0; c < kDimension; ++c) x[c] = FOUR_POINTS(COLUMN(c) + q);
 }
 
-vec4 load_caps(uint q) { return FOUR_CAPS(q); }
+vec4 load_caps(uint q) { return FOUR_CAPS(CAPS + q); }
 
 void load_model(uint model, out float k[kCoefficientStride]) {
   [[unroll]] for (uint v = 0; v < kCoefficientStride / 4; ++v) {

@@ -19,7 +19,7 @@ SWARMFIT_CONST kBindPartials = 3;      // [model][partial sum]; distances and la
 SWARMFIT_CONST kBindCosts = 4;         // [model]
 SWARMFIT_CONST kBindBounds = 5;        // of chunks: columns of push.bound_stride floats, then partial sums of the caps, L1 and L2
 SWARMFIT_CONST kBindLower = 6;         // pairs of a chunk and a model that were looked into; then a lower bound of each model's cost
-SWARMFIT_CONST kBindWork = 7;          // pruned: what is left to compute, see below
+SWARMFIT_CONST kBindWork = 7;          // pruned: what is left to compute; batch: what is asked; see below
 SWARMFIT_CONST kStorageBindings = 8;
 // The first four once more, as texel buffers, four floats a texel: see fetch.glsl.
 SWARMFIT_CONST kBindPointTexels = 8;
@@ -65,10 +65,17 @@ SWARMFIT_CONST kWorkHead = 4;
 SWARMFIT_CONST kTileBits = 8;
 SWARMFIT_CONST kTilesAcross = 32768;  // groups along x; more tiles go on along y
 
+// What a batch asks: for each of its dispatches, in vec4s of words, the arguments of an indirect dispatch of costs and the number of its
+// first item, and the arguments of the reduction; then the items, as batch.glsl has them. An item is a problem and its swarm.
+SWARMFIT_CONST kBatchHead = 2;         // vec4s a dispatch
+SWARMFIT_CONST kBatchDispatches = 32;  // at most
+SWARMFIT_CONST kBatchHeads = 64;       // vec4s of all
+SWARMFIT_CONST kItemWords = 8;
+
 struct Push {
   uint column_stride;  // points in a column, padding included; a multiple of kQuad
   uint partials;       // partial sums of a particle: one a chunk of points, or one an invocation of a chunk
-  uint models;         // assign, pruned: how many
+  uint models;         // assign, pruned: how many; batch: the number of the dispatch
   float tolerance;     // assign: for all points; negative where each has its own
   uint bound_stride;   // chunks, padded to a multiple of kQuad
   uint chunks;         // pruned: of the points

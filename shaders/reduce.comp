@@ -23,6 +23,9 @@ layout(set = 0, binding = kBindCoefficients, std430) readonly buffer Coefficient
 layout(set = 0, binding = kBindLower, std430) readonly buffer Lower { float lower[]; };  // after four words, see bounds.glsl
 #endif
 layout(push_constant) uniform PushBlock { Push push; };
+#ifdef SWARMFIT_BATCH
+#include "batch.glsl"
+#endif
 
 shared float sums[gl_WorkGroupSize.x];
 
@@ -37,11 +40,21 @@ void main() {
     return;
   }
 #endif
+#ifdef SWARMFIT_BATCH
+  take_item();
+  if (particle >= own.models) return;
+  const uint row = own.partials / kWidth;
+  const uint first = own.sums / kWidth + particle * row;
+  const uint place = own.row + particle;
+#else
   const uint row = push.partials / kWidth;
+  const uint first = particle * row;
+  const uint place = particle;
+#endif
   precise Sum sum = Sum(0.0);
   precise Sum lost = Sum(0.0);  // what the additions rounded away
   for (uint i = lane; i < row; i += group) {
-    const Sum value = PARTIAL(particle * row + i);
+    const Sum value = PARTIAL(first + i);
     precise Sum next = sum + value;
     precise Sum added = next - sum;
     precise Sum error = (sum - (next - added)) + (value - added);
@@ -54,5 +67,5 @@ void main() {
     if (lane < half_width) sums[lane] += sums[lane + half_width];
     barrier();
   }
-  if (lane == 0) costs[particle] = sums[0];
+  if (lane == 0) costs[place] = sums[0];
 }

@@ -1,18 +1,11 @@
 #include "kernels/vulkan/cloud.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include <fmt/format.h>
 
 namespace swarmfit::kernels::vulkan {
 namespace {
-
-/// A centred coordinate as float. What float cannot hold is as good as infinitely far, but a residual must not become inf - inf.
-float centred(double value, double centre) {
-  constexpr double kFar = 1e30;
-  return static_cast<float>(std::clamp(value - centre, -kFar, kFar));
-}
 
 /// Most points of a segment: its columns are one binding, its chunks one row of groups.
 std::size_t segment_limit(const DeviceTraits& device, const ChunkShape& shape, int dimension) {
@@ -24,31 +17,21 @@ std::size_t segment_limit(const DeviceTraits& device, const ChunkShape& shape, i
 }  // namespace
 
 Result<> Cloud::set(const PointsView& points, Extent extent) {
-  extent_ = std::move(extent);
-  shape_ = chunk_shape(device_.traits(), extent_.finite_count, points.dimension);
-  const std::size_t limit = segment_limit(device_.traits(), shape_, points.dimension);
+  const ChunkShape shape = chunk_shape(device_.traits(), extent.finite_count, points.dimension);
+  const std::size_t limit = segment_limit(device_.traits(), shape, points.dimension);
   if (limit == 0) {
     return fail(Failure::Kind::invalid, fmt::format("the device's storage range is {} bytes, must be >= {}", device_.traits().storage_range,
-                                                    shape_.points() * sizeof(float) * static_cast<std::size_t>(points.dimension)));
+                                                    shape.points() * sizeof(float) * static_cast<std::size_t>(points.dimension)));
   }
-  rows_.clear();
-  if (extent_.finite_count < points.count) {
-    rows_.reserve(extent_.finite_count);
-    for (std::size_t i = 0; i < points.count; ++i) {
-      if (extent_.finite[i]) rows_.push_back(static_cast<std::uint32_t>(i));
-    }
-  }
-  bounded_ = sorted_ && points.dimension <= 3 && extent_.finite_count > shape_.points();
-  read_columns(points);
-  if (bounded_ && !points.ordered) sort();
-  segments_.resize((extent_.finite_count + limit - 1) / limit);
+  points_.set(points, std::move(extent), shape);
+  segments_.resize((points_.count() + limit - 1) / limit);
   for (std::size_t s = 0; s < segments_.size(); ++s) {
     Segment& segment = segments_[s];
     segment.first = s * limit;
-    segment.count = static_cast<std::uint32_t>(std::min(limit, extent_.finite_count - segment.first));
-    segment.chunks = (segment.count + shape_.points() - 1) / shape_.points();
-    segment.stride = segment.chunks * shape_.points();
-    segment.sums = segment.chunks * shape_.sums;
+    segment.count = static_cast<std::uint32_t>(std::min(limit, points_.count() - segment.first));
+    segment.chunks = (segment.count + shape.points() - 1) / shape.points();
+    segment.stride = segment.chunks * shape.points();
+    segment.sums = segment.chunks * shape.sums;
     segment.points.reserve(device_, sizeof(float) * static_cast<std::size_t>(points.dimension) * segment.stride, Residence::device);
     segment.caps.reserve(device_, sizeof(float) * segment.stride, Residence::device);
     write_columns(segment);
@@ -57,46 +40,19 @@ Result<> Cloud::set(const PointsView& points, Extent extent) {
   return {};
 }
 
-void Cloud::read_columns(const PointsView& points) {
-  dimension_ = points.dimension;
-  reach_ = {};
-  for (std::size_t c = 0; c < static_cast<std::size_t>(dimension_); ++c) {
-    columns_[c].resize(extent_.finite_count);
-    for (std::size_t i = 0; i < extent_.finite_count; ++i) {
-      const float x = columns_[c][i] = centred(points.at(row(i), static_cast<int>(c)), extent_.centre[c]);
-      reach_[c] = std::max(reach_[c], std::abs(x));
-    }
-  }
-}
-
-void Cloud::sort() {
-  const auto width = static_cast<std::size_t>(dimension_);
-  std::array<const float*, kMaxDimension> columns{};
-  for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
-  std::vector<std::uint32_t> order;
-  morton_.sort(std::span(columns).first(width), extent_.finite_count, order);
-  for (std::size_t c = 0; c < width; ++c) {
-    scratch_.resize(order.size());
-    std::transform(order.begin(), order.end(), scratch_.begin(), [&](std::uint32_t i) { return columns_[c][i]; });
-    columns_[c].swap(scratch_);
-  }
-  std::transform(order.begin(), order.end(), order.begin(), [&](std::uint32_t i) { return static_cast<std::uint32_t>(row(i)); });
-  rows_ = std::move(order);
-}
-
 void Cloud::write_columns(Segment& segment) {
-  const auto width = static_cast<std::size_t>(dimension_);
+  const auto width = static_cast<std::size_t>(points_.dimension());
   write(segment.points, width * segment.stride, [&](std::span<float> out) {
     for (std::size_t c = 0; c < width; ++c) {
       const auto column = out.subspan(c * segment.stride, segment.stride);
-      const auto first = columns_[c].begin() + static_cast<std::ptrdiff_t>(segment.first);
-      std::fill(std::copy(first, first + segment.count, column.begin()), column.end(), 0.0F);
+      const std::span<const float> own = points_.column(c).subspan(segment.first, segment.count);
+      std::fill(std::copy(own.begin(), own.end(), column.begin()), column.end(), 0.0F);
     }
   });
-  if (!bounded_) return;
+  if (!bounded()) return;
   ChunkBounds::Columns columns;
-  for (std::size_t c = 0; c < width; ++c) columns[c] = std::span(columns_[c]).subspan(segment.first, segment.count);
-  segment.known.set_points(shape_, columns, dimension_);
+  for (std::size_t c = 0; c < width; ++c) columns[c] = points_.column(c).subspan(segment.first, segment.count);
+  segment.known.set_points(shape(), columns, points_.dimension());
   segment.bounds.reserve(device_, segment.known.values().size_bytes(), Residence::device);
   write_bounds(segment);
 }
@@ -109,7 +65,7 @@ void Cloud::write_bounds(Segment& segment) {
 void Cloud::write_caps(std::span<const float> values) {
   for (Segment& segment : segments_) {
     const std::span<const float> caps = write_values(segment, segment.caps, values);
-    if (!bounded_) continue;
+    if (!bounded()) continue;
     segment.known.set_caps(caps);
     write_bounds(segment);
   }

@@ -1,15 +1,11 @@
-// The points on the device: finite ones only, centred, column after column, in segments no larger than a binding may be.
+// The points on the device, in segments no larger than a binding may be.
 #pragma once
 
-#include <array>
 #include <vector>
 
-#include "kernels/blocks.hpp"
-#include "kernels/checks.hpp"
-#include "kernels/morton_order.hpp"
 #include "kernels/vulkan/buffer.hpp"
 #include "kernels/vulkan/chunk_bounds.hpp"
-#include "kernels/vulkan/tile_shape.hpp"
+#include "kernels/vulkan/stored_points.hpp"
 
 namespace swarmfit::kernels::vulkan {
 
@@ -30,8 +26,8 @@ struct Segment {
 
 class Cloud {
  public:
-  /// `sorted`: points of two or three columns are put in Morton order, so that chunks are small in space, and chunks are bounded.
-  Cloud(const Device& device, bool sorted) : device_(device), sorted_(sorted) {}
+  /// `sorted`: as StoredPoints has it; then chunks are bounded.
+  Cloud(const Device& device, bool sorted) : device_(device), points_(sorted) {}
 
   /// Copies the points, and sets all caps to 0. Buffers that are large enough are kept. Throws std::exception.
   /// Fails with `invalid` where a single chunk does not fit the device's storage range.
@@ -40,15 +36,15 @@ class Cloud {
   void write_caps(std::span<const float> values);
   void write_tolerance(std::span<const float> values);
 
-  const Extent& extent() const noexcept { return extent_; }
+  const Extent& extent() const noexcept { return points_.extent(); }
   /// Are there bounds of chunks?
-  bool bounded() const noexcept { return bounded_; }
+  bool bounded() const noexcept { return points_.bounded(); }
   /// Largest |coordinate| about the centre, a column.
-  const std::array<float, kMaxDimension>& reach() const noexcept { return reach_; }
-  const ChunkShape& shape() const noexcept { return shape_; }
+  const std::array<float, kMaxDimension>& reach() const noexcept { return points_.reach(); }
+  const ChunkShape& shape() const noexcept { return points_.shape(); }
   std::vector<Segment>& segments() noexcept { return segments_; }
   /// The row in the input of a finite point.
-  std::size_t row(std::size_t finite_point) const noexcept { return rows_.empty() ? finite_point : rows_[finite_point]; }
+  std::size_t row(std::size_t finite_point) const noexcept { return points_.row(finite_point); }
 
  private:
   template <class Fill>
@@ -57,19 +53,10 @@ class Cloud {
   std::span<const float> write_values(Segment& segment, Buffer& buffer, std::span<const float> values);
   void write_columns(Segment& segment);
   void write_bounds(Segment& segment);
-  void read_columns(const PointsView& points);
-  void sort();
 
   const Device& device_;
-  bool sorted_, bounded_ = false;
-  std::array<float, kMaxDimension> reach_{};
-  int dimension_ = 0;
-  std::array<std::vector<float>, kMaxDimension> columns_;  // centred, of the finite points in the order they are stored in
+  StoredPoints points_;
   std::vector<float> scratch_;
-  MortonOrder morton_;
-  Extent extent_;
-  ChunkShape shape_;
-  std::vector<std::uint32_t> rows_;  // empty where it would be the identity
   std::vector<Segment> segments_;
   Buffer staging_;
 };

@@ -29,8 +29,6 @@ std::size_t most_open(std::size_t bytes, std::size_t chunks) {
   return words > kRest ? (words - kRest) * 2 / 3 : 1;
 }
 
-std::uint32_t reduce_group(const DeviceTraits& device) { return device.software ? device.subgroup : std::min(64U, device.group_limit); }
-
 void wait_for(const vk::raii::CommandBuffer& commands, vk::AccessFlags access, vk::PipelineStageFlags stage) {
   const vk::MemoryBarrier written(Access::eShaderWrite, access);
   commands.pipelineBarrier(Stage::eComputeShader, stage, {}, written, {}, {});
@@ -110,10 +108,8 @@ void Commands::bind_costs() {
     // A cloud without bounds has something in their place, which no shader looks at.
     const Buffer& bounds = cloud_->bounded() ? segment.bounds : lower_[s];
     const Buffer& work = cloud_->bounded() ? work_[s] : lower_[s];
-    const std::array<vk::DescriptorBufferInfo, 4> buffers{{costs,
-                                                           {bounds.handle(), 0, VK_WHOLE_SIZE},
-                                                           {lower_[s].handle(), 0, VK_WHOLE_SIZE},
-                                                           {work.handle(), 0, VK_WHOLE_SIZE}}};
+    const std::array<vk::DescriptorBufferInfo, 4> buffers{
+        {costs, {bounds.handle(), 0, VK_WHOLE_SIZE}, {lower_[s].handle(), 0, VK_WHOLE_SIZE}, {work.handle(), 0, VK_WHOLE_SIZE}}};
     device_.handle().updateDescriptorSets(
         vk::WriteDescriptorSet(*cost_sets_[s], layout::kBindCosts, 0, vk::DescriptorType::eStorageBuffer, {}, buffers), {});
   }

@@ -98,6 +98,25 @@ std::string obstacle(const vk::raii::PhysicalDevice& device) {
   return {};
 }
 
+Result<Opened> open_device(const EvaluatorOptions& options, std::string_view name) {
+  constexpr std::size_t kSmallestRange = 16384;  // a tile of particles and a chunk of points on any device
+  if (options.max_storage_range > 0 && options.max_storage_range < kSmallestRange) {
+    return fail(Failure::Kind::invalid,
+                fmt::format("max_storage_range is {}, must be 0 or >= {}", options.max_storage_range, kSmallestRange));
+  }
+  Instance instance(options);
+  std::string seen;
+  for (vk::raii::PhysicalDevice& device : instance.devices()) {
+    const std::string device_name = device.getProperties().deviceName.data();
+    const std::string why = obstacle(device);
+    if (why.empty() && (name.empty() || contains_ignoring_case(device_name, name))) return Opened{std::move(instance), std::move(device)};
+    seen += fmt::format("{}{}{}", seen.empty() ? "" : ", ", device_name, why.empty() ? "" : " (" + why + ")");
+  }
+  if (seen.empty()) seen = "none";
+  return fail(Failure::Kind::unavailable, name.empty() ? fmt::format("backend is 'vulkan', but no device can be used; there are: {}", seen)
+                                                       : fmt::format("vulkan device is '{}', must be one of: {}", name, seen));
+}
+
 DeviceDescription describe(const vk::raii::PhysicalDevice& device) {
   const auto chain = device.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceSubgroupProperties>();
   const vk::PhysicalDeviceProperties& properties = chain.get<vk::PhysicalDeviceProperties2>().properties;

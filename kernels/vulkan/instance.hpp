@@ -32,6 +32,15 @@ class Instance {
 /// "discrete GPU", "integrated GPU", "virtual GPU", "software" or "other".
 const char* kind_name(vk::PhysicalDeviceType type) noexcept;
 
+/// A device that can be used, and the instance it belongs to, which must outlive it.
+struct Opened {
+  Instance instance;
+  vk::raii::PhysicalDevice physical;
+};
+/// `name`: part of a device's name, case-insensitive; empty takes the first. Fails with `unavailable` where there is none, and with
+/// `invalid` where options.max_storage_range is too small. Throws std::exception.
+Result<Opened> open_device(const EvaluatorOptions& options, std::string_view name);
+
 /// A queue family that computes, alone if there is one; -1 for none.
 int compute_family(const vk::raii::PhysicalDevice& device);
 

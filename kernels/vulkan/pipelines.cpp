@@ -15,12 +15,16 @@ namespace {
 #include "embedded/bound.h"
 #include "embedded/bound_texels.h"
 #include "embedded/cost.h"
+#include "embedded/cost_batch.h"
+#include "embedded/cost_batch_texels.h"
 #include "embedded/cost_pruned.h"
 #include "embedded/cost_pruned_texels.h"
 #include "embedded/cost_texels.h"
 #include "embedded/distances.h"
 #include "embedded/distances_texels.h"
 #include "embedded/reduce.h"
+#include "embedded/reduce_batch.h"
+#include "embedded/reduce_batch_texels.h"
 #include "embedded/reduce_pruned.h"
 #include "embedded/reduce_pruned_texels.h"
 #include "embedded/reduce_texels.h"
@@ -39,6 +43,8 @@ Spirv spirv(Shader shader, bool texels) {
     case Shader::select: return texels ? Spirv(select_texels_spirv) : Spirv(select_spirv);
     case Shader::cost_pruned: return texels ? Spirv(cost_pruned_texels_spirv) : Spirv(cost_pruned_spirv);
     case Shader::reduce_pruned: return texels ? Spirv(reduce_pruned_texels_spirv) : Spirv(reduce_pruned_spirv);
+    case Shader::cost_batch: return texels ? Spirv(cost_batch_texels_spirv) : Spirv(cost_batch_spirv);
+    case Shader::reduce_batch: return texels ? Spirv(reduce_batch_texels_spirv) : Spirv(reduce_batch_spirv);
     case Shader::assign: break;
   }
   return texels ? Spirv(assign_texels_spirv) : Spirv(assign_spirv);
@@ -68,7 +74,7 @@ bool has_shader(ModelKind kind) noexcept {
 Pipelines::Pipelines(const Device& device, const std::filesystem::path& cache_folder)
     : device_(device), cache_(device, cache_folder), set_layout_(make_set_layout(device)), layout_(make_layout(device, *set_layout_)) {
   for (const Shader shader : {Shader::cost, Shader::reduce, Shader::distances, Shader::assign, Shader::bound, Shader::select,
-                              Shader::cost_pruned, Shader::reduce_pruned}) {
+                              Shader::cost_pruned, Shader::reduce_pruned, Shader::cost_batch, Shader::reduce_batch}) {
     const Spirv code = spirv(shader, device.traits().texels);
     modules_.emplace_back(device.handle(), vk::ShaderModuleCreateInfo({}, code.size_bytes(), code.data()));
   }

@@ -11,7 +11,7 @@
 
 namespace swarmfit::kernels::vulkan {
 
-enum class Shader : std::uint32_t { cost, reduce, distances, assign, bound, select, cost_pruned, reduce_pruned };
+enum class Shader : std::uint32_t { cost, reduce, distances, assign, bound, select, cost_pruned, reduce_pruned, cost_batch, reduce_batch };
 
 /// What a pipeline is specialised for; see shaders/layout.h.
 struct Specialisation {

@@ -17,6 +17,8 @@ std::uint32_t ceil_div(std::size_t a, std::size_t b) { return static_cast<std::u
 // with four coefficients; others hold no more coefficients than that, but four particles at least.
 std::uint32_t largest_tile(const DeviceTraits& device) { return device.software ? 32 : 16; }
 
+std::uint32_t reduce_group(const DeviceTraits& device) { return device.software ? device.subgroup : std::min(64U, device.group_limit); }
+
 ChunkShape chunk_shape(const DeviceTraits& device, std::size_t points, int dimension) {
   ChunkShape shape;
   const std::uint32_t wanted_group = device.software ? device.subgroup : std::max<std::uint32_t>(128, device.subgroup);

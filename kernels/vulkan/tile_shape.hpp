@@ -27,6 +27,9 @@ TileShape tile_shape(const DeviceTraits& device, std::size_t particles, int coef
 /// Particles that a group looks at in a pruned swarm, of which the open ones fill tiles: a multiple of 32.
 std::uint32_t span_shape(std::size_t particles);
 
+/// Invocations of a group that adds up one particle's partial sums; a cost depends on it.
+std::uint32_t reduce_group(const DeviceTraits& device);
+
 /// Particles a tile may have at most; smaller ones divide it.
 std::uint32_t largest_tile(const DeviceTraits& device);
 

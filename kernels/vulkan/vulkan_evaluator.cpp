@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <limits>
 
 #include <fmt/format.h>
@@ -11,6 +9,7 @@
 #include "kernels/pruning_pause.hpp"
 #include "kernels/vulkan/commands.hpp"
 #include "kernels/vulkan/guarded.hpp"
+#include "kernels/vulkan/model_rows.hpp"
 #include "shaders/layout.h"
 
 namespace swarmfit::kernels {
@@ -19,7 +18,6 @@ namespace {
 
 /// Shares of the residuals above which pruning does not pay. Measured on lavapipe; a GPU's is the processor's, for want of one to measure.
 constexpr double kPoorInSoftware = 0.6, kPoor = 0.8;
-constexpr std::size_t kSmallestRange = 16384;  // a tile of particles and a chunk of points on any device
 
 class VulkanEvaluator final : public FitnessEvaluator {
  public:
@@ -51,7 +49,6 @@ class VulkanEvaluator final : public FitnessEvaluator {
 
  private:
   ModelTraits traits_of(ModelKind kind) const noexcept { return own_ ? own_->traits() : traits(kind); }
-  bool centred(ModelKind kind, const double* parameters, double* coefficients) const;
   void evaluate_slice(const SwarmView& swarm, Loss loss, std::span<const float> cutoffs, std::span<float> costs);
   void write_for_pruning(ModelKind kind, float cutoff, std::span<float> row) const;
   bool write_model(ModelKind kind, const double* parameters, std::span<float> row) const;
@@ -162,26 +159,11 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
   }
 }
 
-/// Coefficients in the frame of the stored points; false if one is not finite.
-bool VulkanEvaluator::centred(ModelKind kind, const double* parameters, double* coefficients) const {
-  if (!own_) return centred_coefficients(kind, parameters, cloud_.extent().centre, coefficients);
-  const OwnDistances model(*own_, {parameters, static_cast<std::size_t>(own_->parameter_count)}, cloud_.extent().centre);
-  std::copy(model.parameters().begin(), model.parameters().end(), coefficients);
-  return model.usable();
-}
-
 /// Returns false, and writes zeros, if a coefficient is not finite.
 bool VulkanEvaluator::write_model(ModelKind kind, const double* parameters, std::span<float> row) const {
-  double k[kMaxCoefficients];
-  const bool finite = centred(kind, parameters, k);
-  std::fill(row.begin(), row.end(), 0.0F);
-  // What float cannot hold is farther away than any point either way.
-  constexpr double kMost = 1e30;
-  for (int c = 0; finite && c < traits_of(kind).coefficient_count; ++c) {
-    row[static_cast<std::size_t>(c)] = static_cast<float>(std::clamp(k[c], -kMost, kMost));
-  }
-  row[layout::kKindSlot] = static_cast<float>(kind);
-  return finite;
+  if (!own_) return write_row(kind, parameters, cloud_.extent().centre, row);
+  const OwnDistances model(*own_, {parameters, static_cast<std::size_t>(own_->parameter_count)}, cloud_.extent().centre);
+  return write_row(kind, model.parameters(), model.usable(), row);
 }
 
 void VulkanEvaluator::write_for_pruning(ModelKind kind, float cutoff, std::span<float> row) const {
@@ -262,41 +244,20 @@ Result<> VulkanEvaluator::claim(const PointsView& points, std::span<const float>
   });
 }
 
-bool contains_ignoring_case(std::string_view text, std::string_view part) {
-  const auto same = [](char a, char b) {
-    return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b));
-  };
-  return std::search(text.begin(), text.end(), part.begin(), part.end(), same) != text.end();
-}
-
 Result<std::unique_ptr<FitnessEvaluator>> make(const EvaluatorOptions& options, std::string_view name) {
-  Instance instance(options);
-  std::string seen;
-  for (vk::raii::PhysicalDevice& device : instance.devices()) {
-    const std::string device_name = device.getProperties().deviceName.data();
-    const std::string why = obstacle(device);
-    if (why.empty() && contains_ignoring_case(device_name, name)) {
-      auto evaluator = std::make_unique<VulkanEvaluator>(std::move(instance), std::move(device), options);
-      if (options.own) {
-        if (auto done = evaluator->adopt(options.own); !done) return tl::unexpected(done.error());
-      }
-      return evaluator;
-    }
-    seen += fmt::format("{}{}{}", seen.empty() ? "" : ", ", device_name, why.empty() ? "" : " (" + why + ")");
+  auto opened = open_device(options, name);
+  if (!opened) return tl::unexpected(opened.error());
+  auto evaluator = std::make_unique<VulkanEvaluator>(std::move(opened->instance), std::move(opened->physical), options);
+  if (options.own) {
+    if (auto done = evaluator->adopt(options.own); !done) return tl::unexpected(done.error());
   }
-  if (seen.empty()) seen = "none";
-  return fail(Failure::Kind::unavailable, name.empty() ? fmt::format("backend is 'vulkan', but no device can be used; there are: {}", seen)
-                                                       : fmt::format("vulkan device is '{}', must be one of: {}", name, seen));
+  return evaluator;
 }
 
 }  // namespace
 }  // namespace vulkan
 
 Result<std::unique_ptr<FitnessEvaluator>> make_vulkan_evaluator(const EvaluatorOptions& options, std::string_view device) {
-  if (options.max_storage_range > 0 && options.max_storage_range < vulkan::kSmallestRange) {
-    return fail(Failure::Kind::invalid,
-                fmt::format("max_storage_range is {}, must be 0 or >= {}", options.max_storage_range, vulkan::kSmallestRange));
-  }
   return vulkan::guarded("opening a device", Failure::Kind::unavailable, [&] { return vulkan::make(options, device); });
 }
 
