@@ -1,4 +1,5 @@
 // Many small clouds in one call: each answer is that of its own call.
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -7,6 +8,7 @@
 #include <swarmfit/batch.hpp>
 
 #include "host/bench/bench_case.hpp"
+#include "host/swarm/lock_step.hpp"
 
 namespace swarmfit {
 namespace {
@@ -70,6 +72,93 @@ TEST(Batch, HoldsOnOtherBackEnds) {
     ASSERT_TRUE(together) << together.error().message;
     for (std::size_t k = 0; k < problems.views.size(); ++k) expect_same(fit(problems.views[k], small_fit(0, backend)), (*together)[k]);
   }
+}
+
+/// Forty clouds of all sizes, among them an empty one, one with points that are not finite, one of another dimension and one that is
+/// too large for a batch.
+struct Awkward : Problems {
+  explicit Awkward(ModelType type) : Problems(40, type) {
+    const auto width = static_cast<std::size_t>(dimension(type));
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      values[k].resize((40 + 6 * k) * width);
+      views[k] = PointsView(std::span<const float>(values[k]), dimension(type));
+    }
+    views[5] = PointsView(std::span<const float>(), dimension(type));
+    for (std::size_t i = 0; i < 20 * width; i += 3) values[11][i] = std::numeric_limits<float>::quiet_NaN();
+    views[17] = PointsView(std::span<const float>(values[17]).first(40 * 4), 4);
+    values[23] = bench_internal::synthetic_points(type, 17000, 7);
+    views[23] = PointsView(std::span<const float>(values[23]), dimension(type));
+  }
+};
+
+void expect_each_as_alone(const Problems& problems, const FitOptions& options, const std::vector<Expected<FitResult>>& together) {
+  ASSERT_EQ(together.size(), problems.views.size());
+  auto alone = Fitter::create(options);
+  ASSERT_TRUE(alone) << alone.error().message;
+  for (std::size_t k = 0; k < problems.views.size(); ++k) {
+    SCOPED_TRACE("cloud " + std::to_string(k));
+    const auto expected = alone->fit(problems.views[k]);
+    if (expected) {
+      expect_same(expected, together[k]);
+      EXPECT_EQ(expected->backend.reason, together[k]->backend.reason);
+    } else {
+      ASSERT_FALSE(together[k]);
+      EXPECT_EQ(expected.error().kind, together[k].error().kind);
+      EXPECT_EQ(expected.error().message, together[k].error().message);
+    }
+  }
+}
+
+TEST(Batch, OnADeviceInStepGivesWhatEachCallGives) {
+  for (const ModelType type : {ModelType::line2d, ModelType::plane}) {
+    SCOPED_TRACE(name(type));
+    const Awkward problems(type);
+    FitOptions options = small_fit(0, "vulkan");
+    options.model = type;
+    const auto together = fit_batch(problems.views, options);
+    if (!together && together.error().kind == Error::Kind::backend_unavailable) GTEST_SKIP() << together.error().message;
+    ASSERT_TRUE(together) << together.error().message;
+    expect_each_as_alone(problems, options, *together);
+    options.threads = 1;
+    const auto again = fit_batch(problems.views, options);
+    ASSERT_TRUE(again) << again.error().message;
+    for (std::size_t k = 0; k < problems.views.size(); ++k) {
+      if ((*together)[k]) expect_same((*together)[k], (*again)[k]);
+    }
+  }
+}
+
+/// In step on any back end: fewer problems than clouds, so that some come in when others are done.
+TEST(Batch, InStepIsFewSubmissions) {
+  const Problems problems(40);
+  for (const char* backend : {"cpu", "vulkan"}) {
+    SCOPED_TRACE(backend);
+    const FitOptions options = small_fit(1, backend);
+    auto batch = kernels::make_batch_evaluator(backend, {}, 16);
+    if (!batch && batch.error().kind == kernels::Failure::Kind::unavailable) continue;
+    ASSERT_TRUE(batch) << batch.error().message;
+    for (const int threads : {1, 3}) {
+      std::vector<Expected<FitResult>> together(problems.views.size());
+      const auto told = swarm::fit_in_step(problems.views, options, threads, **batch, "asked for by name", together);
+      expect_each_as_alone(problems, options, together);
+      std::size_t evaluations = 0;
+      for (const auto& one : together) evaluations += one ? one->evaluations : 0;
+      EXPECT_GT(told.swarms, 1000U);
+      EXPECT_GE(evaluations, told.swarms);
+      // Sixteen are under way until few are left.
+      EXPECT_LT(12 * told.submissions, told.swarms);
+    }
+  }
+}
+
+TEST(Batch, WithATimeBudgetGoesOneAfterAnother) {
+  const Problems problems(3);
+  FitOptions options = small_fit(0, "vulkan");
+  options.time_budget_ms = 60000;
+  const auto together = fit_batch(problems.views, options);
+  if (!together && together.error().kind == Error::Kind::backend_unavailable) GTEST_SKIP() << together.error().message;
+  ASSERT_TRUE(together) << together.error().message;
+  expect_each_as_alone(problems, options, *together);
 }
 
 TEST(Batch, KeepsOneCloudsFailureToItself) {

@@ -10,6 +10,7 @@
 
 #include "host/models/model_space.hpp"
 #include "host/models/own_model.hpp"
+#include "host/swarm/fitter_parts.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_model.hpp"
@@ -136,6 +137,14 @@ Expected<Fitter> Fitter::create(const FitOptions& options) {
   if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
   auto state = std::make_unique<State>();
   if (auto opened = state->open(options); !opened) return tl::unexpected(opened.error());
+  return Fitter(std::move(state));
+}
+
+Fitter FitterParts::assemble(const FitOptions& options, std::unique_ptr<kernels::FitnessEvaluator> evaluator, std::string reason) {
+  auto state = std::make_unique<Fitter::State>();
+  state->options = options;
+  state->evaluator = std::move(evaluator);
+  state->reason = std::move(reason);
   return Fitter(std::move(state));
 }
 

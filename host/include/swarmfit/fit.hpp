@@ -120,6 +120,7 @@ class SWARMFIT_API Fitter {
   BackendInfo backend() const;
 
  private:
+  friend struct FitterParts;
   struct State;
   explicit Fitter(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
