@@ -32,7 +32,7 @@ Eigen::Matrix2Xf problem(unsigned seed) {
   std::uniform_real_distribution<float> anywhere(0, 1);
   std::normal_distribution<float> noise(0, static_cast<float>(kNoise));
   Eigen::Matrix2Xf points(2, kPoints);
-  Eigen::Vector2f a, b;
+  Eigen::Vector2f a = Eigen::Vector2f::Zero(), b = Eigen::Vector2f::Zero();
   for (int i = 0; i < kPoints; ++i) {
     if (i < kLines * kOnLine && i % kOnLine == 0) {
       do {
