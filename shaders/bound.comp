@@ -17,7 +17,9 @@ void main() {
   const uint model = gl_WorkGroupID.x;
   float k[kCoefficientStride];
   load_model(model, k);
-  if (model == 0 && lane < kWorkHead) work[lane] = lane == 2 ? 1 : 0;  // 0 x 0 x 1 groups, and no tile
+  if (model == 0) {
+    for (uint i = lane; i < kWorkHead; i += group) work[i] = i == 2 ? 1 : 0;  // 0 x 0 x 1 groups, and no tile
+  }
 
   float sum = 0.0;
   for (uint quad = lane; quad < push.bound_stride / kQuad; quad += group) {
