@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace swarmfit::models {
 namespace {
@@ -11,7 +12,19 @@ constexpr int kHalvings = 4;          // of damping before a step is given up
 constexpr double kSettled = 1e-7;     // relative fall of the squares below which steps end
 constexpr double kLeastRank = 1e-12;  // of the information matrix: below, the points do not determine the model
 
+constexpr std::size_t kKept = std::size_t{1} << 16;  // points of a support that are kept: 2 MiB at most
+
 }  // namespace
+
+SupportRows::SupportRows(const WorkingPoints& points, const Weighted& support)
+    : points_(points), support_(support), width_(static_cast<std::size_t>(points.dimension())) {
+  if (size() > kKept) return;
+  std::vector<double> rows(size() * width_);
+  for (std::size_t k = 0; k < size(); ++k) {
+    for (std::size_t d = 0; d < width_; ++d) rows[k * width_ + d] = points.at(support.index[k], static_cast<int>(d));
+  }
+  kept_ = std::move(rows);
+}
 
 double CurvedSpace::distance(const Position& a, const Position& b) const {
   Position v(parameter_count());
@@ -22,11 +35,12 @@ double CurvedSpace::distance(const Position& a, const Position& b) const {
 bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, Position& theta) const {
   const auto least = static_cast<std::size_t>((freedom() + residual_components() - 1) / residual_components());
   if (support.index.size() < least) return false;
+  const SupportRows rows(points, support);
   Position best = theta;
   double damping = 1e-6;
   bool moved = false;
   for (int step = 0; step < kSteps; ++step) {
-    const Equations at = equations(points, support, best);
+    const Equations at = equations(rows, best);
     if (at.used < least || !at.information.allFinite()) break;
     bool better = false;
     for (int attempt = 0; attempt < kHalvings && !better; ++attempt, damping *= 100) {
@@ -37,7 +51,7 @@ bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, P
       const Position by = solver.solve(-at.gradient);
       Position candidate = retract(best, by);
       if (!candidate.allFinite() || !admit(candidate)) continue;
-      const double now = squares(points, support, candidate);
+      const double now = squares(rows, candidate);
       if (!(now < at.squares)) continue;
       better = moved = true;
       best = candidate;
@@ -53,7 +67,7 @@ bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, P
 }
 
 Eigen::MatrixXd CurvedSpace::unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
-  const Equations at = equations(points, support, theta);
+  const Equations at = equations({points, support}, theta);
   const Basis chart = basis(theta);
   const Eigen::MatrixXd information = at.information;
   return chart * information.completeOrthogonalDecomposition().pseudoInverse() * chart.transpose();
@@ -61,7 +75,7 @@ Eigen::MatrixXd CurvedSpace::unit_covariance(const WorkingPoints& points, const 
 
 double CurvedSpace::noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double) const {
   const double degrees = static_cast<double>(support.index.size()) * residual_components() - freedom();
-  return squares(points, support, theta) / std::max(1.0, degrees);
+  return squares({points, support}, theta) / std::max(1.0, degrees);
 }
 
 Eigen::MatrixXd CurvedSpace::covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const {

@@ -1,13 +1,40 @@
 // What the kinds without a closed least-squares form share: Gauss-Newton steps on a local chart, and the covariance that comes with it.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include <Eigen/Dense>
 
 #include "host/models/model_space.hpp"
 
 namespace swarmfit::models {
+
+/// The points of a support in the working frame. Few are kept, for every step runs over them again; many are read anew each time.
+class SupportRows {
+ public:
+  using Room = std::array<double, kMaxDimension>;
+
+  SupportRows(const WorkingPoints& points, const Weighted& support);
+
+  std::size_t size() const noexcept { return support_.index.size(); }
+  double weight(std::size_t k) const noexcept { return support_.weight[k]; }
+  /// Columns of point k, in `room` where they are not kept.
+  const double* row(std::size_t k, Room& room) const noexcept {
+    if (!kept_.empty()) return kept_.data() + k * width_;
+    for (std::size_t d = 0; d < width_; ++d) room[d] = points_.at(support_.index[k], static_cast<int>(d));
+    return room.data();
+  }
+
+ private:
+  const WorkingPoints& points_;
+  Weighted support_;
+  std::size_t width_;
+  std::vector<double> kept_;
+};
 
 /// A kind whose residual is linearised around a position, as `Linearised` does. Chart: `freedom()` numbers near 0, the position itself being 0.
 class CurvedSpace : public ModelSpace {
@@ -37,14 +64,14 @@ class CurvedSpace : public ModelSpace {
     double squares = 0;  ///< r^T W r
     std::size_t used = 0;
   };
-  virtual Equations equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+  virtual Equations equations(const SupportRows& support, const Position& theta) const = 0;
   /// r^T W r; infinite where the residual is not defined at a point.
-  virtual double squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+  virtual double squares(const SupportRows& support, const Position& theta) const = 0;
 };
 
 /// The sums of a kind whose sizes are known at compile time: they run over every point of the support at each step, and are most of what a
-/// refinement takes. `Kind` has `bool linearise(points, point, theta, Linear&) const`, false where the residual is not defined at this
-/// point, which then has no say.
+/// refinement takes. `Kind` has `bool linearise(row, theta, Linear&) const`, row the point's columns, false where the residual is not defined
+/// at this point, which then has no say.
 template <class Kind, class Base, int Components, int Parameters>
 class Linearised : public Base {
  protected:
@@ -58,15 +85,16 @@ class Linearised : public Base {
 
   int residual_components() const noexcept override { return Components; }
 
-  typename Base::Equations equations(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+  typename Base::Equations equations(const SupportRows& support, const Position& theta) const override {
     Eigen::Matrix<double, Parameters, Parameters> information = Eigen::Matrix<double, Parameters, Parameters>::Zero();
     Eigen::Matrix<double, Parameters, 1> gradient = Eigen::Matrix<double, Parameters, 1>::Zero();
     typename Base::Equations sum;
     Linear at;
     at.by_parameter.setZero();
-    for (std::size_t k = 0; k < support.index.size(); ++k) {
-      if (!itself().linearise(points, support.index[k], theta, at)) continue;
-      const double w = support.weight[k];
+    SupportRows::Room room;
+    for (std::size_t k = 0; k < support.size(); ++k) {
+      if (!itself().linearise(support.row(k, room), theta, at)) continue;
+      const double w = support.weight(k);
       for (int i = 0; i < Components; ++i) {
         const Row row = at.by_parameter.row(i);
         for (int c = 0; c < Parameters; ++c) information.col(c) += (w * row[c]) * row.transpose();
@@ -81,12 +109,13 @@ class Linearised : public Base {
     return sum;
   }
 
-  double squares(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+  double squares(const SupportRows& support, const Position& theta) const override {
     double sum = 0;
     Linear at;
-    for (std::size_t k = 0; k < support.index.size(); ++k) {
-      if (!itself().linearise(points, support.index[k], theta, at)) return std::numeric_limits<double>::infinity();
-      sum += support.weight[k] * at.residual.squaredNorm();
+    SupportRows::Room room;
+    for (std::size_t k = 0; k < support.size(); ++k) {
+      if (!itself().linearise(support.row(k, room), theta, at)) return std::numeric_limits<double>::infinity();
+      sum += support.weight(k) * at.residual.squaredNorm();
     }
     return sum;
   }

@@ -96,8 +96,8 @@ class Cylinder final : public Linearised<Cylinder, CurvedSpace, 1, 7> {
     return true;
   }
 
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
-    const Vector axis = theta.segment<3>(3), arm = points.point<3>(point) - theta.head<3>();
+  bool linearise(const double* row, const Position& theta, Linear& at) const {
+    const Vector axis = theta.segment<3>(3), arm = Eigen::Map<const Vector>(row) - theta.head<3>();
     const double along = axis.dot(arm);
     const Vector across = arm - along * axis;
     const double length = across.norm();

@@ -102,8 +102,8 @@ class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
   }
 
   /// Sampson's error.
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
-    const Eigen::Vector4d p = points.point<4>(point);
+  bool linearise(const double* row, const Position& theta, Linear& at) const {
+    const Eigen::Vector4d p(row);
     const Eigen::Map<const Matrix> m(theta.data());
     const Eigen::Vector3d x = first(p), y = second(p), right = m * x, left = m.transpose() * y;
     const double gradient = std::sqrt(right.head<2>().squaredNorm() + left.head<2>().squaredNorm());

@@ -60,8 +60,8 @@ class Homography final : public Linearised<Homography, Projective, 2, 9> {
   }
 
   /// Sampson's error: c(x, H) = (u - x', v - y') with (u, v) = H x, divided by the root of its covariance under unit noise in all columns.
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
-    const Eigen::Vector4d p = points.point<4>(point);
+  bool linearise(const double* row, const Position& theta, Linear& at) const {
+    const Eigen::Vector4d p(row);
     const Eigen::Map<const Matrix> m(theta.data());
     const Eigen::Vector3d x = first(p);
     const double depth = m.row(2).dot(x);

@@ -56,8 +56,8 @@ class Round : public Linearised<Round<D>, CurvedSpace, 1, D + 1> {
 
   bool admit(Position& theta) const override { return theta.allFinite() && theta[D] > 0 && theta[D] < kLargest; }
 
-  bool linearise(const WorkingPoints& points, std::uint32_t point, const Position& theta, Linear& at) const {
-    const Vector arm = points.template point<D>(point) - theta.template head<D>();
+  bool linearise(const double* row, const Position& theta, Linear& at) const {
+    const Vector arm = Eigen::Map<const Vector>(row) - theta.template head<D>();
     const double length = arm.norm();
     if (!(length > 0)) return false;
     at.residual[0] = length - theta[D];

@@ -21,7 +21,8 @@ constexpr int kPasses = 2;             // the second knows which points the firs
 class Along {
  public:
   Along(const models::WorkingPoints& points, std::span<const float> distances, std::span<const std::uint16_t> nearest, std::uint16_t label,
-        float tau) {
+        float tau)
+      : dimension_(points.dimension()) {
     for (std::uint32_t i = 0; i < distances.size(); ++i) {
       if (!(distances[i] <= kSlabs * tau) || (nearest[i] != 0 && nearest[i] != label)) continue;
       all_.push_back({{}, i});
@@ -38,6 +39,20 @@ class Along {
 
   /// Places of the points nearest to that at a place, itself left out; where two are as near, the one that comes first on the walk outwards.
   std::size_t near(std::size_t place, std::array<std::uint32_t, kNear>& nearest) const {
+    if (dimension_ == 2) return near_in<2>(place, nearest);
+    if (dimension_ == 3) return near_in<3>(place, nearest);
+    return near_in<models::kMaxDimension>(place, nearest);
+  }
+
+ private:
+  static constexpr double kNothing = std::numeric_limits<double>::infinity();
+  struct One {
+    std::array<double, models::kMaxDimension> at;
+    std::uint32_t point;
+  };
+
+  template <std::size_t D>
+  std::size_t near_in(std::size_t place, std::array<std::uint32_t, kNear>& nearest) const {
     std::array<double, kNear> square{};
     std::size_t count = 0, below = place, above = place + 1;
     for (;;) {
@@ -46,7 +61,7 @@ class Along {
       const double step = std::min(down, up);
       if (step == kNothing || (count == kNear && step * step >= square[kNear - 1])) return count;
       const std::size_t other = down <= up ? --below : above++;
-      const double far = apart(place, other);
+      const double far = apart<D>(place, other);
       if (count == kNear && far >= square[kNear - 1]) continue;
       std::size_t slot = count < kNear ? count++ : kNear - 1;
       for (; slot > 0 && square[slot - 1] > far; --slot) {
@@ -57,13 +72,6 @@ class Along {
       nearest[slot] = static_cast<std::uint32_t>(other);
     }
   }
-
- private:
-  static constexpr double kNothing = std::numeric_limits<double>::infinity();
-  struct One {
-    std::array<double, models::kMaxDimension> at;
-    std::uint32_t point;
-  };
 
   std::size_t widest() const {
     std::size_t widest = 0;
@@ -81,12 +89,14 @@ class Along {
     return widest;
   }
 
+  template <std::size_t D>
   double apart(std::size_t a, std::size_t b) const {
     double sum = 0;
-    for (std::size_t d = 0; d < models::kMaxDimension; ++d) sum += (all_[a].at[d] - all_[b].at[d]) * (all_[a].at[d] - all_[b].at[d]);
+    for (std::size_t d = 0; d < D; ++d) sum += (all_[a].at[d] - all_[b].at[d]) * (all_[a].at[d] - all_[b].at[d]);
     return sum;
   }
 
+  int dimension_;
   std::vector<One> all_;
 };
 

@@ -85,6 +85,8 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
   if (ground.space.closed_form()) return ground.space.refine_by_moments(evidence.moments, ground.points.frame(), theta);
   std::vector<std::uint32_t> index;
   std::vector<double> weight;
+  index.reserve(evidence.count);
+  weight.reserve(evidence.count);
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float d = distances[i];
     if (!(d <= ground.allowed_at(i)) || (!caps.empty() && d > caps[i])) continue;

@@ -9,6 +9,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr std::uint32_t kAttempts = 32;  // of a sample that turns out degenerate
+constexpr std::size_t kWords = 4;        // random ones that are drawn at a time
 constexpr double kNearby = 0.003;        // of the candidates, on each side of a point in their order, are nearby
 constexpr std::size_t kLeastNearby = 12;
 constexpr std::size_t kMostNeighbours = 32;
@@ -61,9 +62,9 @@ bool Sampler::draw(bool local, std::uint32_t round, std::uint32_t step, std::uin
   const auto wanted = static_cast<std::size_t>(space_.minimal_sample());
   std::array<std::uint32_t, 8> sample{}, words{};
   for (std::uint32_t attempt = 0; attempt < kAttempts; ++attempt) {
-    for (std::uint32_t block = 0; block < 2; ++block) {
+    for (std::uint32_t block = 0; block < (wanted + kWords - 1) / kWords; ++block) {
       const auto four = random_.words(Draw::sample, round, step * 2 + block, particle * kAttempts + attempt);
-      std::copy(four.begin(), four.end(), words.begin() + 4 * block);
+      std::copy(four.begin(), four.end(), words.begin() + kWords * block);
     }
     const std::size_t first = Random::below(words[0], live_.size());
     sample[0] = live_[first];

@@ -9,8 +9,18 @@ struct Ball {
 
   static void centre(const double* p, const double* c, double* k) {
     constexpr double kFar = 1e15, kPoint = 1e-30;
-    double offset[D], length = 0;
-    for (int d = 0; d < D; ++d) length = std::hypot(length, offset[d] = p[d] - c[d]);
+    double offset[D], square = 0;
+    for (int d = 0; d < D; ++d) {
+      offset[d] = p[d] - c[d];
+      square += offset[d] * offset[d];
+    }
+    // hypot costs as much as a block of residuals; it is for what squares cannot hold.
+    constexpr double kLeastSquare = 1e-200, kMostSquare = 1e200;
+    double length = std::sqrt(square);
+    if (!(square > kLeastSquare && square < kMostSquare)) {
+      length = 0;
+      for (int d = 0; d < D; ++d) length = std::hypot(length, offset[d]);
+    }
     const double near = std::clamp(length - std::abs(p[D]), -kFar, kFar);
     const double radius = std::clamp(std::abs(p[D]), kPoint, kFar);
     for (int d = 0; d < D; ++d) {
