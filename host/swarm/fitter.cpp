@@ -214,12 +214,14 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   FitResult result;
   swarm::Watch watch{state_->observer, 0};
   std::vector<swarm::Known> known;
+  bool points_set = false;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options);
   if (options.estimate_threshold || !given) {
     auto estimated =
         swarm::estimate_threshold(evaluator, working, part, whole->finite_count(), options, state_->observer ? &watch : nullptr, spread);
     if (!estimated) return tl::unexpected(estimated.error());
     result.threshold = estimated->threshold;
+    points_set = true;
     // The preset of the paper finds each model by a search of its own.
     if (options.preset == Preset::fast) known = std::move(estimated->models);
   } else {
@@ -228,6 +230,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
   std::optional<swarm::MultiModel> search(std::in_place, evaluator, kinds, working, part, options.seed, limits, spread);
   search->watched_by(state_->observer ? &watch : nullptr);
+  if (points_set) search->points_are_set();
   if (auto done = search->run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
   std::vector<models::Placed> found = search->found();
   const auto tau = static_cast<float>(result.threshold);

@@ -74,9 +74,10 @@ Expected<> MultiModel::show(std::span<const float> caps) {
 
 void MultiModel::count_effort(FitResult& result) const {
   const kernels::Effort effort = evaluator_.effort();
-  result.evaluations = static_cast<std::size_t>(effort.evaluations);
-  const double whole = static_cast<double>(effort.evaluations) * static_cast<double>(points_.finite_count()) * settings_.stands_for;
-  result.points_touched = whole > 0 ? static_cast<double>(effort.touched) / whole : 1.0;
+  const std::uint64_t evaluations = effort.evaluations - effort_before_.evaluations, touched = effort.touched - effort_before_.touched;
+  result.evaluations = static_cast<std::size_t>(evaluations);
+  const double whole = static_cast<double>(evaluations) * static_cast<double>(points_.finite_count()) * settings_.stands_for;
+  result.points_touched = whole > 0 ? static_cast<double>(touched) / whole : 1.0;
 }
 
 Expected<> MultiModel::take(const Candidate& candidate, Outcome outcome, const ModelCallback& on_model, FitResult& result) {
@@ -153,7 +154,11 @@ Expected<> MultiModel::adopt(const Known& known, const ModelCallback& on_model, 
 
 Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
                            std::span<const Known> known) {
-  if (auto done = evaluator_.set_points(searched().view()); !done) return tl::unexpected(to_error(done.error()));
+  if (points_set_) {
+    effort_before_ = evaluator_.effort();
+  } else if (auto done = evaluator_.set_points(searched().view()); !done) {
+    return tl::unexpected(to_error(done.error()));
+  }
   restore_caps();  // not before: setting points takes most of the memory
   if (auto done = show(caps_); !done) return done;
   Seeds seeds(kinds_.size());

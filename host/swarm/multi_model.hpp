@@ -53,6 +53,8 @@ class MultiModel {
 
   /// Told of each step of each swarm; must outlive this. Null: nobody is.
   void watched_by(Watch* watch) noexcept { watch_ = watch; }
+  /// The evaluator has the points of this search already, from one before: setting them again would but sort them anew.
+  void points_are_set() noexcept { points_set_ = true; }
 
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
   /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.
@@ -208,6 +210,8 @@ class MultiModel {
   bool eager_ = false;                                   // do swarms end soon, until one of them finds nothing?
   bool looked_flat_ = false;                             // since the last model was found
   Watch* watch_ = nullptr;
+  bool points_set_ = false;
+  kernels::Effort effort_before_;  // of the evaluator, in earlier searches
   std::string stop_reason_;
 };
 

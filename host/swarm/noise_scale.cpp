@@ -168,6 +168,7 @@ class Estimate {
     const std::uint64_t seed = in_.options.seed + static_cast<std::uint64_t>(++rounds_);
     MultiModel search(in_.evaluator, kinds_, in_.points, in_.part, seed, limits, in_.spread);
     search.watched_by(in_.watch);
+    if (rounds_ > 1) search.points_are_set();
     if (auto done = search.run({}, {}, result); !done) return tl::unexpected(done.error());
     return search.found();
   }
