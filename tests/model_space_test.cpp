@@ -220,6 +220,21 @@ TEST_P(Models, RefinementFindsTheTruthFromNearby) {
   }
 }
 
+TEST_P(Models, ManyPointsAreRefinedAsFewAre) {
+  // The same points over and over: more than are kept from step to step.
+  const Draw draw(GetParam(), 200, 0.01, engine_);
+  constexpr std::size_t kTimes = 400;
+  std::vector<std::uint32_t> index;
+  for (std::size_t time = 0; time < kTimes; ++time) index.insert(index.end(), draw.index.begin(), draw.index.end());
+  const std::vector<double> weight(index.size(), 1.0 / kTimes), once(draw.index.size(), 1.0);
+  Position few = space_->from_data(GetParam().truth, draw.points.frame());
+  ASSERT_TRUE(space_->admit(few));
+  Position many = few;
+  ASSERT_TRUE(space_->refine(draw.points, {draw.index, once}, few));
+  ASSERT_TRUE(space_->refine(draw.points, {index, weight}, many));
+  EXPECT_LT(space_->distance(few, many), 1e-6);
+}
+
 TEST_P(Models, TooFewPointsAreNotRefined) {
   const Draw draw(GetParam(), 60, 0, engine_);
   Position theta = space_->from_data(GetParam().truth, draw.points.frame());

@@ -202,6 +202,19 @@ TEST_P(Models, ARadiusOfZeroIsAPointOrALine) {
   EXPECT_FLOAT_EQ(cylinder[2], std::sqrt(20.0F));
 }
 
+TEST(Balls, ACentreTooNearOrTooFarForSquaresKeepsItsDirection) {
+  const std::array<double, 2> origin{};
+  const double unit = std::sqrt(0.5);
+  for (const double far : {1e-250, 1e-170, 1e-90, 1.0, 1e90, 1e170}) {
+    const std::array<double, 3> circle{far, -far, 1};
+    std::array<double, 7> k{};
+    ASSERT_TRUE(centred_coefficients(ModelKind::circle2d, circle.data(), origin.data(), k.data())) << far;
+    const double near = std::clamp(far / unit - 1, -1e15, 1e15);  // to the nearer end of the diameter through the origin
+    EXPECT_NEAR(k[0] / near, unit, 1e-12) << far;
+    EXPECT_NEAR(k[1] / near, -unit, 1e-12) << far;
+  }
+}
+
 TEST_P(Models, NeitherScaleNorSignOfAMatrixMatters) {
   const std::vector<Point> points = random_points(200, 3, numbers());
   for (const ModelKind kind : {ModelKind::homography, ModelKind::fundamental}) {

@@ -1,16 +1,53 @@
 // The threshold that the data themselves tell.
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include <swarmfit/fit.hpp>
 
+#include "host/models/model_space.hpp"
+#include "host/swarm/noise_scale.hpp"
+#include "host/swarm/random.hpp"
+#include "kernels/evaluators.hpp"
+
 namespace swarmfit {
 namespace {
+
+/// Counts how often it is given points.
+class Counting final : public kernels::FitnessEvaluator {
+ public:
+  explicit Counting(std::unique_ptr<kernels::FitnessEvaluator> inner) : inner_(std::move(inner)) {}
+  const kernels::Identity& identity() const noexcept override { return inner_->identity(); }
+  kernels::Support supports(const kernels::Workload& workload) const override { return inner_->supports(workload); }
+  kernels::Result<> set_points(const kernels::PointsView& points) override {
+    ++times;
+    return inner_->set_points(points);
+  }
+  kernels::Result<> set_caps(std::span<const float> caps) override { return inner_->set_caps(caps); }
+  kernels::Result<> evaluate(const kernels::SwarmView& swarm, kernels::Loss loss, std::span<const float> cutoffs,
+                             std::span<float> costs) override {
+    return inner_->evaluate(swarm, loss, cutoffs, costs);
+  }
+  kernels::Result<> distances(const kernels::ModelView& model, std::span<float> distances) override {
+    return inner_->distances(model, distances);
+  }
+  kernels::Result<> assign(std::span<const kernels::ModelView> models, std::span<const float> tolerance,
+                           std::span<std::uint16_t> labels) override {
+    return inner_->assign(models, tolerance, labels);
+  }
+  kernels::Effort effort() const noexcept override { return inner_->effort(); }
+
+  int times = 0;
+
+ private:
+  std::unique_ptr<kernels::FitnessEvaluator> inner_;
+};
 
 constexpr double kSigma = 0.0075;
 
@@ -50,6 +87,34 @@ TEST(NoiseScale, CirclesAmongOutliersSeldomMisleadIt) {
     near += sigmas > 0.75 * 2.5 && sigmas < 1.25 * 2.5 ? 1 : 0;
   }
   EXPECT_GE(near, kScenes - 3);
+}
+
+TEST(NoiseScale, PointsAreSetOnceForAllSearches) {
+  const std::vector<double> xy = circles(1);
+  FitOptions options;
+  options.model = ModelType::circle2d;
+  auto inner = kernels::make_cpu_evaluator({});
+  ASSERT_TRUE(inner);
+  Counting evaluator(std::move(*inner));
+  models::WorkingPoints points(PointsView(std::span<const double>(xy), 2));
+  const auto space = models::make_space(options.model, {});
+  const swarm::Part part = swarm::look_closely(points, *space, swarm::Random(1), points.size());
+  const auto scale = swarm::estimate_threshold(evaluator, points, part, points.finite_count(), options);
+  ASSERT_TRUE(scale) << scale.error().message;
+  EXPECT_EQ(evaluator.times, 1);
+}
+
+TEST(NoiseScale, WhatTheSearchForItCostIsNotTheFits) {
+  const std::vector<double> xy = circles(1);
+  FitOptions options;
+  options.model = ModelType::circle2d;
+  options.backend = "cpu";
+  const auto estimated = fit(PointsView(std::span<const double>(xy), 2), options);
+  ASSERT_TRUE(estimated) << estimated.error().message;
+  ASSERT_GE(estimated->models.size(), 2U);
+  // The first model came with the threshold: nothing is evaluated for it beside the straight lines that it must be better than.
+  constexpr std::size_t kOfASwarm = 64, kSwarms = 4, kSteps = 3;
+  EXPECT_LE(estimated->models.front().evaluations, kOfASwarm * kSwarms * kSteps);
 }
 
 }  // namespace
