@@ -364,5 +364,15 @@ TEST(Subset, CoversEvenlyAndKeepsNeighboursTogether) {
   EXPECT_LT(along, 0.3 * across);
 }
 
+TEST(Settings, StillStepsThatAreAskedForAreThoseOfAllSwarms) {
+  FitOptions options;
+  options.model = ModelType::line2d;
+  EXPECT_GT(resolve(options, 1000, 0.01).eager_stall, 0) << "else the first swarms end sooner";
+  options.stall = 7;
+  const Settings asked = resolve(options, 1000, 0.01);
+  EXPECT_EQ(asked.stall, 7);
+  EXPECT_EQ(asked.eager_stall, 0);
+}
+
 }  // namespace
 }  // namespace swarmfit::swarm

@@ -186,7 +186,10 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
     s.still = kStillOnPart;
     if (flat) s.particles = options.particles.value_or(kFlatOnPart);
   }
-  s.stall = options.stall.value_or(s.stall);
+  if (options.stall) {
+    s.stall = *options.stall;
+    s.eager_stall = 0;  // who asks for so many steps means all swarms
+  }
   s.deflation = options.deflation.value_or(s.deflation);
   s.lambda = options.lambda.value_or(s.lambda);
   s.loss = options.loss.value_or(s.loss);
