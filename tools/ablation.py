@@ -26,7 +26,7 @@ LINE_ROWS = [
     ("fast", "the default", []),
     ("fast, parametric deflation", "Eq. (5) instead of sinking caps", ["--deflation", "parametric"]),
     ("fast, s = 3", "swarms end sooner", ["--stall", "3"]),
-    ("fast, s = 5", "the default for lines", ["--stall", "5"]),
+    ("fast, s = 5", "all swarms alike", ["--stall", "5"]),
     ("fast, s = 10", "the default for planes", ["--stall", "10"]),
     ("fast, s = 20", "and later", ["--stall", "20"]),
     ("fast, 32 particles", "", ["--particles", "32"]),
@@ -43,7 +43,7 @@ PLANE_ROWS = LINE_ROWS
 REAL_ROWS = [
     ("fast", "the default", []),
     ("fast, parametric deflation", "", ["--deflation", "parametric"]),
-    ("fast, s = 5", "", ["--stall", "5"]),
+    ("fast, s = 5", "all swarms alike", ["--stall", "5"]),
     ("fast, s = 10", "", ["--stall", "10"]),
     ("fast, s = 20", "", ["--stall", "20"]),
     ("fast, 50 particles", "", ["--particles", "50"]),
