@@ -34,12 +34,10 @@ class Counting final : public kernels::FitnessEvaluator {
                              std::span<float> costs) override {
     return inner_->evaluate(swarm, loss, cutoffs, costs);
   }
-  kernels::Result<> distances(const kernels::ModelView& model, std::span<float> distances) override {
-    return inner_->distances(model, distances);
-  }
-  kernels::Result<> assign(std::span<const kernels::ModelView> models, std::span<const float> tolerance,
-                           std::span<std::uint16_t> labels) override {
-    return inner_->assign(models, tolerance, labels);
+  // Nobody asks: points are weighed where they lie.
+  kernels::Result<> distances(const kernels::ModelView&, std::span<float>) override { return kernels::fail({}, "distances"); }
+  kernels::Result<> assign(std::span<const kernels::ModelView>, std::span<const float>, std::span<std::uint16_t>) override {
+    return kernels::fail({}, "assign");
   }
   kernels::Effort effort() const noexcept override { return inner_->effort(); }
 
