@@ -1,6 +1,6 @@
 // Small problems a second: three lines of 60 points each, with noise, and 120 points anywhere in the unit square.
 //   steps  one swarm's costs of each problem, a call a problem and all in one call, on every back end;
-//   fits   one after another, and as a batch: on the processor with one thread, two, and so on up to all there are, on a Vulkan device in step.
+//   fits   one after another, and as a batch: on the processor with one thread, two, and so on up to all there are, on Vulkan in step.
 // Prints a table; ends with 1 where a batch's answer is not that of each by itself.
 #include <algorithm>
 #include <chrono>

@@ -1,7 +1,7 @@
 // Before a pruned swarm's costs, after their bounds: which models must be evaluated over which chunks. A group looks at four chunks and
-// kSpan models. Where all of a chunk's points are beyond a model's reach the partial sums are those of the caps; of a model that cannot come
-// below its cutoff nobody asks; the others are packed into tiles for cost.comp. Which place a chunk's tiles get depends on who comes first,
-// but every partial sum has a place of its own, so that no cost does.
+// kSpan models. Where all of a chunk's points are beyond a model's reach the partial sums are those of the caps; of a model that cannot
+// come below its cutoff nobody asks; the others are packed into tiles for cost.comp. Which place a chunk's tiles get depends on who comes
+// first, but every partial sum has a place of its own, so that no cost does.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 #include "common.glsl"

@@ -1,9 +1,10 @@
-// Many small fits on one device: each goes its own way on the host, and whenever all of them wait for a swarm's costs, one submission scores
-// all these swarms.
+// Many small fits on one device: each goes its own way on the host, and whenever all of them wait for a swarm's costs, one submission
+// scores all these swarms.
 //
-// The loop of a fit is deep (threshold, models, contests, polishing, labels), and turning it inside out so that it could stop at every swarm
-// would cost its readability. So each fit has a thread that stops in the evaluator's place, and the last one to ask submits for all. As a
-// problem's costs do not depend on what else is submitted, a fit's answer is that of the fit alone, whichever others are under way.
+// The loop of a fit is deep (threshold, models, contests, polishing, labels), and turning it inside out so that it could stop at every
+// swarm would cost its readability. So each fit has a thread that stops in the evaluator's place, and the last one to ask submits for
+// all. As a problem's costs do not depend on what else is submitted, a fit's answer is that of the fit alone, whichever others are under
+// way.
 #pragma once
 
 #include <cstdint>
@@ -61,8 +62,8 @@ struct StepReport {
 };
 
 /// results[k] = fit(clouds[k], options), but for its times and, on a Vulkan device, points_touched: everything is computed there. As many
-/// fits as the batch has problems are under way. `batch` is of the back end that the options ask for, `reason` says why; the options are valid
-/// and ask for neither an own model nor a time budget. So many threads run side by side on the host, 0 as many as the machine has.
+/// fits as the batch has problems are under way. `batch` is of the back end that the options ask for, `reason` says why; the options are
+/// valid and ask for neither an own model nor a time budget. So many threads run side by side on the host, 0 as many as the machine has.
 StepReport fit_in_step(std::span<const PointsView> clouds, const FitOptions& options, int threads, kernels::BatchEvaluator& batch,
                        const std::string& reason, std::span<Expected<FitResult>> results);
 

@@ -1,5 +1,5 @@
-// Many small problems on one device: a submission scores a swarm of each. Groups of invocations are of a problem and a tile of its particles
-// over a chunk of its points; the sums are those of the problem alone, in the same order.
+// Many small problems on one device: a submission scores a swarm of each. Groups of invocations are of a problem and a tile of its
+// particles over a chunk of its points; the sums are those of the problem alone, in the same order.
 #pragma once
 
 #include <compare>
