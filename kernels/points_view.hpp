@@ -33,6 +33,14 @@ struct PointsView {
     return v;
   }
   bool finite(std::size_t row) const noexcept;
+  /// So many rows from `first` on, which must be a multiple of 64 where it is known which rows are finite.
+  PointsView rows(std::size_t first, std::size_t number) const noexcept {
+    PointsView part = *this;
+    part.data = static_cast<const char*>(data) + first * stride;
+    part.count = number;
+    if (finite_rows != nullptr) part.finite_rows += first / 64;
+    return part;
+  }
 };
 
 }  // namespace swarmfit::kernels

@@ -113,5 +113,32 @@ TEST_F(Refinement, UniqueSupportOfTwinsIsNothing) {
   EXPECT_GT((*unique)[2], 100U);
 }
 
+TEST(Distances, OfARunAreThoseOfAPassOverAll) {
+  // An image's holes lie elsewhere in the run than at the cloud's start.
+  constexpr std::size_t kFirst = 2048;
+  std::vector<float> rows;
+  for (std::size_t i = 0; i < 2 * kFirst; ++i) {
+    const bool hole = i < kFirst ? i / 64 % 2 == 0 : i / 64 % 3 == 0;
+    const auto t = static_cast<float>(i);
+    rows.insert(rows.end(), {hole ? std::nanf("") : t, std::sin(t)});
+  }
+  kernels::EvaluatorOptions options;
+  options.threads = 1;
+  const auto cpu = std::move(*kernels::make_cpu_evaluator(options));
+  const models::WorkingPoints points{PointsView(std::span<const float>(rows), 2)};
+  const auto space = models::make_space(ModelType::line2d, std::nullopt);
+  const Ground ground{.evaluator = *cpu, .space = *space, .points = points, .tau = 0.5F};
+  const models::Position line = space->from_data(Eigen::Vector3d(0, 1, 0.1), points.frame());
+  std::vector<float> all(points.size()), run(kFirst);
+  ASSERT_TRUE(weigh(ground, line, {}, all));
+  ASSERT_TRUE(tell_distances(ground, line, kFirst, run));
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    ASSERT_EQ(std::isnan(run[i]), !points.finite(kFirst + i)) << i;
+    if (points.finite(kFirst + i)) {
+      ASSERT_EQ(run[i], all[kFirst + i]) << i;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace swarmfit::swarm

@@ -48,27 +48,28 @@ void take_nearer(std::span<const float> distances, std::span<float> least) {
   for (std::size_t i = 0; i < least.size(); ++i) least[i] = distances[i] < least[i] ? distances[i] : least[i];
 }
 
-Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
-                                  std::span<float> distances) {
+namespace {
+
+Expected<kernels::Evidence> weigh_rows(const Ground& ground, const kernels::PointsView& rows, const kernels::Weighing& how,
+                                       const models::Position& theta, std::span<float> distances) {
   const models::Position data = ground.space.to_data(theta, ground.points.frame());
   const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
   kernels::Evidence evidence;
-  const auto done =
-      ground.evaluator.weigh(ground.view(), ground.weighing(caps, ground.corner), std::span(&model, 1), distances, std::span(&evidence, 1));
+  const auto done = ground.evaluator.weigh(rows, how, std::span(&model, 1), distances, std::span(&evidence, 1));
   if (!done) return tl::unexpected(to_error(done.error()));
   return evidence;
 }
 
+}  // namespace
+
+Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& theta, std::span<const float> caps,
+                                  std::span<float> distances) {
+  return weigh_rows(ground, ground.view(), ground.weighing(caps, ground.corner), theta, distances);
+}
+
 Expected<> tell_distances(const Ground& ground, const models::Position& theta, std::size_t first, std::span<float> distances) {
-  const models::Position data = ground.space.to_data(theta, ground.points.frame());
-  const kernels::ModelView model{ground.space.kind(), std::span<const double>(data.data(), static_cast<std::size_t>(data.size()))};
-  kernels::PointsView run = ground.view();
-  run.data = static_cast<const std::byte*>(run.data) + first * run.stride;
-  run.count = distances.size();
-  kernels::Evidence evidence;
-  const auto done = ground.evaluator.weigh(run, {ground.tau, ground.corner, {}}, std::span(&model, 1), distances, std::span(&evidence, 1));
-  if (!done) return tl::unexpected(to_error(done.error()));
-  return {};
+  const auto told = weigh_rows(ground, ground.view().rows(first, distances.size()), {ground.tau, ground.corner, {}}, theta, distances);
+  return told ? Expected<>() : tl::unexpected(told.error());
 }
 
 Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
