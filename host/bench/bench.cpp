@@ -208,11 +208,7 @@ Expected<> run_cloud(Bench& bench, const BenchOptions& options, ModelType type, 
 /// Rows that are finite: the others are no work, and would flatter every rate.
 swarm::Rows finite_rows(const PointsView& cloud) {
   const models::WorkingPoints working(cloud);
-  std::vector<std::uint32_t> index;
-  for (std::size_t i = 0; i < working.size(); ++i) {
-    if (working.finite(i)) index.push_back(static_cast<std::uint32_t>(i));
-  }
-  return {working.view(), index};
+  return {working.view(), swarm::draw_part(working, swarm::Random(0), swarm::kThinnedPart, working.finite_count())};
 }
 
 }  // namespace

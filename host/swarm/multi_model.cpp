@@ -41,8 +41,7 @@ MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kin
       ground_{.evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = tau_, .allowed = allowed_},
       part_ground_{.evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = tau_, .part = &part_} {
   if (!allowed_.empty()) part_.gather(allowed_, part_allowed_);
-  part_ground_.allowed = part_allowed_;
-  part_ground_.widest = widest_of(part_allowed_);
+  part_ground_.allow(part_allowed_);
   for (const Kind& kind : kinds_) landscapes_.emplace_back(evaluator, *kind.space, points.frame(), kind.settings);
 }
 

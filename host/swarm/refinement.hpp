@@ -27,6 +27,11 @@ struct Ground {
 
   /// The same for a model of another kind.
   Ground of(const models::ModelSpace& other) const noexcept { return {evaluator, other, points, tau, part, corner, allowed, widest}; }
+  /// From now on each point may be off by its own.
+  void allow(std::span<const float> each) noexcept {
+    allowed = each;
+    widest = widest_of(each);
+  }
   /// What the k-th point may be off.
   float allowed_at(std::size_t k) const noexcept { return allowed.empty() ? tau : allowed[k]; }
   /// Which points speak for a model, under `caps` or, where these are empty, under what the points may be off.
