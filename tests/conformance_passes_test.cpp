@@ -100,6 +100,24 @@ TEST_P(Passes, ASurveyTellsALineFromAPlaneInFloat) {
   EXPECT_NEAR(s[1][1] - s[0][1] * s[0][1] / s[0][0], 0, 1e-12 * s[0][0]);
 }
 
+TEST_P(Passes, ASurveyTellsAPlaneFromASolidInFloat) {
+  Cloud cloud;
+  for (int i = 0; i < 20000; ++i) {
+    const float u = 0.001F * static_cast<float>(i % 173), v = 0.01F * static_cast<float>(i % 91);
+    cloud.narrow.insert(cloud.narrow.end(), {u - 0.5F * v, v, 3.0F + 0.25F * u + v});
+    cloud.caps.push_back(1);
+  }
+  Survey found;
+  ASSERT_OK(evaluator().survey(cloud.view(), found));
+  Eigen::Matrix3d scatter;
+  for (int d = 0; d < 3; ++d) {
+    for (int e = 0; e < 3; ++e) scatter(d, e) = found.moments.scatter[static_cast<std::size_t>(d)][static_cast<std::size_t>(e)];
+  }
+  const Eigen::Vector3d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+  EXPECT_NEAR(spread[0], 0, 1e-12 * spread[2]);
+  EXPECT_GT(spread[1], 1e-3 * spread[2]);
+}
+
 TEST_P(Passes, WeighedAlikeOnAllSizes) {
   for (const ModelKind kind : {ModelKind::line2d, ModelKind::plane}) {
     for (const std::size_t points : kSizes) {

@@ -127,8 +127,12 @@ struct CpuKernels {
   /// Tight rows of `dimension` doubles, less the pivot, as floats: finite stays finite, anything else becomes NaN.
   void (*narrow)(const double* rows, std::size_t dimension, std::size_t count, const double* pivot, float* out);
 
-  /// Of all finite points, each with weight 1; in double, so that the moments tell a plane from a line.
-  void (*sum_all)(const Strip& strip, std::size_t dimension, StripSums& sums);
+  /// Of `count` tight rows, at most kStripPoints, less the pivot: which are finite, and their sums, each with weight 1.
+  using Look = void (*)(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, StripSums& sums,
+                        std::uint64_t* finite);
+  Look survey;
+  /// The sums in double, so that the moments tell a plane from a line.
+  Look survey_exactly;
 
   /// Of the points within the tolerance and their limit; see Weighing. `distances` may be null.
   void (*weigh)(ModelKind kind, const Strip& strip, const float* coefficients, float tolerance, float corner, StripSums& sums,

@@ -93,6 +93,16 @@ struct Bench {
     return points.scalar == Scalar::float32 ? load_as<float>(kernels, points, limit, caps) : load_as<double>(kernels, points, limit, caps);
   }
 
+  /// Strip number `index` of the points, of which it is not known yet what is finite; false if none is.
+  bool survey(const CpuKernels& kernels, CpuKernels::Look look, const PointsView& points, std::size_t index, StripSums& sums) {
+    first = index * kStripPoints;
+    count = std::min(kStripPoints, points.count - first);
+    cut(points);
+    fetch_probes(points, first + kStripPoints);
+    return points.scalar == Scalar::float32 ? survey_as<float>(kernels, look, points, sums)
+                                             : survey_as<double>(kernels, look, points, sums);
+  }
+
   /// What was found for the strip's rows to where the caller has a place for each of his; `nothing` for those that are not in it.
   template <class T, class Give>
   void hand_back(T nothing, std::span<T> all, Give&& give) const {
@@ -171,19 +181,44 @@ struct Bench {
     }
   }
 
-  template <class S>
-  bool load_as(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
+  /// look(), which takes the pivot for the origin and tells which rows of the pieces are finite; once more about one that is where none had
+  /// been found before. False if none is.
+  template <class S, class Look>
+  bool look_about_pivot(const PointsView& points, Look&& look) {
     const bool chosen = choose_pivot<S>(points, first, count, pivot);
-    split<S>(kernels, points, limit, caps);
-    const auto word = std::find_if(finite.begin(), finite.begin() + static_cast<std::ptrdiff_t>((strip.count + kWordBits - 1) / kWordBits),
-                                   [](std::uint64_t bits) { return bits != 0; });
-    const std::size_t place = static_cast<std::size_t>(word - finite.begin()) * kWordBits;
-    if (place >= strip.count) return false;
+    look();
+    const Piece& last = pieces[piece_count - 1];
+    const auto end = finite.begin() + static_cast<std::ptrdiff_t>((last.at + last.count + kWordBits - 1) / kWordBits);
+    const auto word = std::find_if(finite.begin(), end, [](std::uint64_t bits) { return bits != 0; });
+    if (word == end) return false;
     if (!chosen) {
+      const std::size_t place = static_cast<std::size_t>(word - finite.begin()) * kWordBits;
       read_row<S>(points, first + row_at(place) + static_cast<std::size_t>(std::countr_zero(*word)), pivot);
-      split<S>(kernels, points, limit, caps);
+      look();
     }
     return true;
+  }
+
+  template <class S>
+  bool survey_as(const CpuKernels& kernels, CpuKernels::Look look, const PointsView& points, StripSums& sums) {
+    return look_about_pivot<S>(points, [&] {
+      look(tight_rows<S>(kernels, points, pieces[0]), static_cast<std::size_t>(points.dimension), count, origin<S>(points).data(), sums,
+           finite.data());
+    });
+  }
+
+  template <class S>
+  bool load_as(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
+    return look_about_pivot<S>(points, [&] { split<S>(kernels, points, limit, caps); });
+  }
+
+  /// What kernels take off rows: nothing where it was taken off while they were narrowed.
+  template <class S>
+  std::array<float, kMaxDimension> origin(const PointsView& points) const {
+    std::array<float, kMaxDimension> origin{};
+    if constexpr (!std::is_same_v<S, float>) return origin;
+    for (std::size_t d = 0; d < static_cast<std::size_t>(points.dimension); ++d) origin[d] = static_cast<float>(pivot[d]);
+    return origin;
   }
 
   std::size_t row_at(std::size_t place) const {
@@ -194,11 +229,9 @@ struct Bench {
 
   template <class S>
   void split(const CpuKernels& kernels, const PointsView& points, float limit, std::span<const float> caps) {
-    std::array<float, kMaxDimension> origin{};
-    for (std::size_t d = 0; d < static_cast<std::size_t>(points.dimension); ++d) origin[d] = static_cast<float>(pivot[d]);
-    if constexpr (!std::is_same_v<S, float>) origin = {};  // taken off while rows are narrowed
+    const std::array<float, kMaxDimension> off = origin<S>(points);
     for (const Piece& piece : std::span(pieces).first(piece_count)) {
-      kernels.split(tight_rows<S>(kernels, points, piece), static_cast<std::size_t>(points.dimension), piece.count, origin.data(), limit,
+      kernels.split(tight_rows<S>(kernels, points, piece), static_cast<std::size_t>(points.dimension), piece.count, off.data(), limit,
                     caps.empty() ? nullptr : caps.data() + piece.row, piece.at, strip, finite.data() + piece.at / kWordBits);
     }
   }
@@ -227,6 +260,23 @@ struct Bench {
   }
 };
 
+/// Have points so much extent in every direction that sums in float tell it? By the pivots of Gaussian elimination, none of which is less
+/// than the least spread of all directions.
+bool clearly_solid(int dimension, const Moments& moments) {
+  constexpr double kThin = 1e-4;  // of the largest; sums of a strip are off by some 1e-6 of its spread
+  auto a = moments.scatter;
+  const auto size = static_cast<std::size_t>(dimension);
+  double largest = 0;
+  for (std::size_t d = 0; d < size; ++d) largest = std::max(largest, a[d][d]);
+  for (std::size_t d = 0; d < size; ++d) {
+    if (!(a[d][d] > kThin * largest)) return false;
+    for (std::size_t r = d + 1; r < size; ++r) {
+      for (std::size_t c = d + 1; c < size; ++c) a[r][c] -= a[r][d] * a[d][c] / a[d][d];
+    }
+  }
+  return true;
+}
+
 /// body(bench, run, strip) for each strip, a task for each run of them.
 template <class Body>
 void for_strips(const PointsView& points, Body&& body) {
@@ -241,15 +291,17 @@ void for_strips(const PointsView& points, Body&& body) {
 
 void PointPasses::survey(const PointsView& points, Survey& survey) {
   survey.finite.resize((points.count + 63) / 64);
+  survey_with(kernels_.survey, points, survey);
+  if (survey.finite_count > 0 && !clearly_solid(points.dimension, survey.moments)) survey_with(kernels_.survey_exactly, points, survey);
+}
+
+void PointPasses::survey_with(CpuKernels::Look look, const PointsView& points, Survey& survey) {
   evidence_.assign(run_count(points), {});
   PointsView unknown = points;
   unknown.finite_rows = nullptr;
   for_strips(unknown, [&](Bench& bench, std::size_t run, std::size_t strip) {
-    if (bench.load(kernels_, unknown, strip, 0)) {
-      StripSums sums;
-      kernels_.sum_all(bench.strip, static_cast<std::size_t>(points.dimension), sums);
-      bench.add(sums, evidence_[run]);
-    }
+    StripSums sums;
+    if (bench.survey(kernels_, look, unknown, strip, sums)) bench.add(sums, evidence_[run]);
     std::copy_n(bench.finite.begin(), (bench.count + 63) / 64, survey.finite.begin() + static_cast<std::ptrdiff_t>(strip * kStripWords));
   });
   std::array<Evidence, 1> all;

@@ -23,6 +23,7 @@ class PointPasses {
              std::span<Evidence> evidence);
 
  private:
+  void survey_with(CpuKernels::Look look, const PointsView& points, Survey& survey);
   /// `evidence_` of each run, one a model, into one.
   void add_up(std::size_t runs, std::span<Evidence> evidence) const;
 

@@ -1,5 +1,41 @@
 // Inner loops of the passes over the caller's points, strip by strip. Included by cpu_kernels-inl.hpp only, inside its namespace.
 
+template <std::size_t D>
+HWY_INLINE void load_rows(const float* HWY_RESTRICT rows, Vector* x) {
+  const FloatTag d;
+  if constexpr (D == 2) hn::LoadInterleaved2(d, rows, x[0], x[1]);
+  if constexpr (D == 3) hn::LoadInterleaved3(d, rows, x[0], x[1], x[2]);
+  if constexpr (D == 4) hn::LoadInterleaved4(d, rows, x[0], x[1], x[2], x[3]);
+}
+
+/// Rows less the pivot, in columns; 0 where a row is not finite.
+template <std::size_t D>
+struct CentredRows {
+  Vector x[D];
+  hn::Mask<FloatTag> usable;
+
+  HWY_INLINE CentredRows(const float* HWY_RESTRICT rows, const float* HWY_RESTRICT pivot) {
+    constexpr float kFar = 1e18F;  // its square is still a float
+    const FloatTag d;
+    const Vector zero = hn::Zero(d);
+    load_rows<D>(rows, x);
+    Vector probe = hn::Mul(x[0], zero);  // stays 0 unless a column is NaN or infinite
+    for (std::size_t c = 1; c < D; ++c) probe = hn::MulAdd(x[c], zero, probe);
+    usable = hn::Eq(probe, zero);
+    for (std::size_t c = 0; c < D; ++c) {
+      const Vector centred = hn::Clamp(hn::Sub(x[c], hn::Set(d, pivot[c])), hn::Set(d, -kFar), hn::Set(d, kFar));
+      x[c] = hn::IfThenElseZero(usable, centred);
+    }
+  }
+
+  /// A bit a row, into the word of row i.
+  HWY_INLINE void tell(std::size_t i, std::uint64_t* HWY_RESTRICT finite) const {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(FloatTag(), usable, bits);
+    finite[i / 64] |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << (i % 64);
+  }
+};
+
 /// Sums held in registers: of weights, of weighted coordinates and of their products.
 template <std::size_t D>
 struct VectorSums {
@@ -10,6 +46,13 @@ struct VectorSums {
     for (std::size_t a = 0; a < D; ++a) {
       first[a] = hn::Zero(FloatTag());
       for (std::size_t b = a; b < D; ++b) second[a][b] = hn::Zero(FloatTag());
+    }
+  }
+  /// All that are finite speak alike; nobody asks for weights.
+  HWY_INLINE void add(const CentredRows<D>& rows) {
+    for (std::size_t a = 0; a < D; ++a) {
+      first[a] = hn::Add(first[a], rows.x[a]);
+      for (std::size_t b = a; b < D; ++b) second[a][b] = hn::MulAdd(rows.x[a], rows.x[b], second[a][b]);
     }
   }
   /// `w` is 0 where a point does not speak.
@@ -33,43 +76,30 @@ struct VectorSums {
   }
 };
 
+/// The rows from row i on, fewer than a vector's, and behind them such as are not finite.
 template <std::size_t D>
-HWY_INLINE void load_rows(const float* HWY_RESTRICT rows, Vector* x) {
-  const FloatTag d;
-  if constexpr (D == 2) hn::LoadInterleaved2(d, rows, x[0], x[1]);
-  if constexpr (D == 3) hn::LoadInterleaved3(d, rows, x[0], x[1], x[2]);
-  if constexpr (D == 4) hn::LoadInterleaved4(d, rows, x[0], x[1], x[2], x[3]);
+HWY_INLINE void fill_up(const float* HWY_RESTRICT rows, std::size_t i, std::size_t count, float* HWY_RESTRICT last) {
+  std::fill(last, last + D * lanes(), std::numeric_limits<float>::quiet_NaN());
+  if (i < count) std::copy(rows + i * D, rows + count * D, last);
 }
 
 template <std::size_t D>
 HWY_INLINE void split_of(const float* HWY_RESTRICT rows, std::size_t count, const float* HWY_RESTRICT pivot, float limit,
                          const float* HWY_RESTRICT caps, std::size_t at, Strip& strip, std::uint64_t* HWY_RESTRICT finite) {
-  constexpr float kFar = 1e18F;  // its square is still a float
   const FloatTag d;
-  const Vector zero = hn::Zero(d);
   std::fill(finite, finite + (count + 63) / 64, std::uint64_t{0});
+  const Vector same = hn::Set(d, limit);
   const auto put = [&](std::size_t i, const float* from, Vector allowed) HWY_ATTR {
-    Vector x[D];
-    load_rows<D>(from, x);
-    Vector probe = hn::Mul(x[0], zero);  // stays 0 unless a column is NaN or infinite
-    for (std::size_t c = 1; c < D; ++c) probe = hn::MulAdd(x[c], zero, probe);
-    const auto usable = hn::Eq(probe, zero);
-    for (std::size_t c = 0; c < D; ++c) {
-      const Vector centred = hn::Clamp(hn::Sub(x[c], hn::Set(d, pivot[c])), hn::Set(d, -kFar), hn::Set(d, kFar));
-      hn::Store(hn::IfThenElseZero(usable, centred), d, strip.columns[c].data() + at + i);
-    }
-    hn::Store(hn::IfThenElse(usable, allowed, hn::Set(d, -1.0F)), d, strip.limit.data() + at + i);
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(d, usable, bits);
-    finite[i / 64] |= (std::uint64_t{bits[0]} | std::uint64_t{bits[1]} << 8) << (i % 64);
+    const CentredRows<D> here(from, pivot);
+    for (std::size_t c = 0; c < D; ++c) hn::Store(here.x[c], d, strip.columns[c].data() + at + i);
+    hn::Store(hn::IfThenElse(here.usable, allowed, hn::Set(d, -1.0F)), d, strip.limit.data() + at + i);
+    here.tell(i, finite);
   };
   const std::size_t whole = count - count % lanes();
-  const Vector same = hn::Set(d, limit);
   for (std::size_t i = 0; i < whole; i += lanes()) put(i, rows + i * D, caps != nullptr ? hn::LoadU(d, caps + i) : same);
   HWY_ALIGN float last[D * lanes()], last_caps[lanes()] = {};
   for (std::size_t i = whole; i % kMaxLanes != 0 || i < count; i += lanes()) {
-    std::fill(last, last + D * lanes(), std::numeric_limits<float>::quiet_NaN());
-    if (i < count) std::copy(rows + i * D, rows + count * D, last);
+    fill_up<D>(rows, i, count, last);
     if (i < count && caps != nullptr) std::copy(caps + i, caps + count, last_caps);
     put(i, last, caps != nullptr ? hn::Load(d, last_caps) : same);
   }
@@ -124,39 +154,78 @@ HWY_INLINE void load_columns(const Strip& strip, std::size_t i, Vector* x) {
   for (std::size_t c = 0; c < D; ++c) x[c] = hn::Load(FloatTag(), strip.columns[c].data() + i);
 }
 
+/// The same in double.
 template <std::size_t D>
-HWY_INLINE void sum_all_of(const Strip& strip, StripSums& sums) {
-  // Columns of points that are not finite are 0 and add nothing.
-  using WideTag = hn::ScalableTag<double>;
-  using Wide = hn::Vec<WideTag>;
-  const WideTag d;
-  const hn::Rebind<float, WideTag> narrow;
-  const auto zero = hn::Zero(narrow), one = hn::Set(narrow, 1.0F);
-  Wide count = hn::Zero(d), first[D], second[D][D];
-  for (std::size_t a = 0; a < D; ++a) {
-    first[a] = hn::Zero(d);
-    for (std::size_t b = a; b < D; ++b) second[a][b] = hn::Zero(d);
+struct WideSums {
+  using Tag = hn::ScalableTag<double>;
+  using Wide = hn::Vec<Tag>;
+  Wide first[D], second[D][D];
+
+  HWY_INLINE WideSums() {
+    for (std::size_t a = 0; a < D; ++a) {
+      first[a] = hn::Zero(Tag());
+      for (std::size_t b = a; b < D; ++b) second[a][b] = hn::Zero(Tag());
+    }
   }
-  for (std::size_t i = 0; i < strip.count; i += hn::Lanes(d)) {
-    Wide x[D];
-    for (std::size_t c = 0; c < D; ++c) x[c] = hn::PromoteTo(d, hn::Load(narrow, strip.columns[c].data() + i));
-    const auto usable = hn::Ge(hn::Load(narrow, strip.limit.data() + i), zero);
-    count = hn::Add(count, hn::PromoteTo(d, hn::IfThenElseZero(usable, one)));
+  HWY_INLINE void add(const Wide* x) {
     for (std::size_t a = 0; a < D; ++a) {
       first[a] = hn::Add(first[a], x[a]);
       for (std::size_t b = a; b < D; ++b) second[a][b] = hn::MulAdd(x[a], x[b], second[a][b]);
     }
   }
-  const auto total = [&](Wide v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
-  sums.count = sums.weight = total(count);
-  for (std::size_t a = 0; a < D; ++a) {
-    sums.first[a] = total(first[a]);
-    for (std::size_t b = a; b < D; ++b) sums.second[a][b] = total(second[a][b]);
+  HWY_INLINE void add(const CentredRows<D>& rows) {
+    const Tag d;
+    Wide x[D];
+#if HWY_TARGET == HWY_SCALAR
+    for (std::size_t c = 0; c < D; ++c) x[c] = hn::PromoteTo(d, rows.x[c]);
+#else
+    const hn::Rebind<float, Tag> narrow;
+    for (std::size_t c = 0; c < D; ++c) x[c] = hn::PromoteTo(d, hn::LowerHalf(narrow, rows.x[c]));
+    add(x);
+    for (std::size_t c = 0; c < D; ++c) x[c] = hn::PromoteTo(d, hn::UpperHalf(narrow, rows.x[c]));
+#endif
+    add(x);
   }
+  HWY_INLINE void finish(StripSums& sums) const {
+    for (std::size_t a = 0; a < D; ++a) {
+      sums.first[a] = hn::GetLane(hn::SumOfLanes(Tag(), first[a]));
+      for (std::size_t b = a; b < D; ++b) sums.second[a][b] = hn::GetLane(hn::SumOfLanes(Tag(), second[a][b]));
+    }
+  }
+};
+
+template <std::size_t D, class Sums>
+HWY_INLINE void survey_of(const float* HWY_RESTRICT rows, std::size_t count, const float* HWY_RESTRICT pivot, StripSums& sums,
+                          std::uint64_t* HWY_RESTRICT finite) {
+  const std::size_t words = (count + 63) / 64, whole = count - count % lanes();
+  std::fill(finite, finite + words, std::uint64_t{0});
+  Sums all;
+  for (std::size_t i = 0; i < whole; i += lanes()) {
+    const CentredRows<D> here(rows + i * D, pivot);
+    all.add(here);
+    here.tell(i, finite);
+  }
+  // A call in the loop would keep the sums out of registers.
+  if (whole < count) {
+    HWY_ALIGN float last[D * lanes()];
+    fill_up<D>(rows, whole, count, last);
+    const CentredRows<D> here(last, pivot);
+    all.add(here);
+    here.tell(whole, finite);
+  }
+  all.finish(sums);
+  std::size_t usable = 0;
+  for (std::size_t w = 0; w < words; ++w) usable += static_cast<std::size_t>(hwy::PopCount(finite[w]));
+  sums.count = sums.weight = static_cast<double>(usable);
 }
 
-void sum_all(const Strip& strip, std::size_t dimension, StripSums& sums) {
-  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { sum_all_of<D>(strip, sums); });
+void survey(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, StripSums& sums, std::uint64_t* finite) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { survey_of<D, VectorSums<D>>(rows, count, pivot, sums, finite); });
+}
+
+void survey_exactly(const float* rows, std::size_t dimension, std::size_t count, const float* pivot, StripSums& sums,
+                    std::uint64_t* finite) {
+  with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { survey_of<D, WideSums<D>>(rows, count, pivot, sums, finite); });
 }
 
 template <class Model>
@@ -169,6 +238,7 @@ HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficie
   for (int c = 0; c < Model::traits.coefficient_count; ++c) k[c] = hn::Set(d, coefficients[c]);
   VectorSums<D> all;
   Vector cost = zero;
+  bool any = false;
   for (std::size_t i = 0; i < strip.count; i += lanes()) {
     Vector x[D];
     load_columns<D>(strip, i, x);
@@ -181,12 +251,13 @@ HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficie
       hn::StoreU(told, d, distances + i);
     }
     if (hn::AllFalse(d, speaks)) continue;
+    any = true;
     all.count = hn::Add(all.count, hn::IfThenElseZero(speaks, one));
     all.square = hn::Add(all.square, hn::IfThenElseZero(speaks, hn::Mul(distance, distance)));
     // A distance of 0 divides to infinity, and the corner is less.
     all.add(x, hn::IfThenElseZero(speaks, hn::Min(hn::Div(widest, distance), most)));
   }
-  all.finish(sums);
+  if (any) all.finish(sums);
   sums.cost = static_cast<double>(hn::GetLane(hn::SumOfLanes(d, cost)));
 }
 
