@@ -13,6 +13,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -108,6 +109,14 @@ class FitnessEvaluator {
   /// Labels as `assign` gives them, by one tolerance or one a point, and what each model's own points say of it, each with weight 1.
   virtual Result<> claim(const PointsView& points, std::span<const float> tolerance, std::span<const ModelView> models,
                          std::span<std::uint16_t> labels, std::span<Evidence> evidence);
+
+  // Work of the caller's own.
+
+  /// Are swarms of so many models shared between threads, which are then awake between them?
+  virtual bool shares(std::size_t models) const noexcept;
+
+  /// body(task) for each task, in any order, on the threads that share the evaluator's work.
+  virtual void share_out(std::size_t tasks, const std::function<void(std::size_t)>& body);
 };
 
 }  // namespace swarmfit::kernels

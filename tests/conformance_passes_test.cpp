@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <limits>
 
+#include <Eigen/Dense>
+
 #include "conformance.hpp"
 
 namespace swarmfit::kernels::conformance {

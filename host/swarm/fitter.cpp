@@ -196,7 +196,8 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   std::optional<swarm::Rows> thin_rows;
   models::WorkingPoints thin;
   if (settings.stands_for > 1) {
-    thin_rows.emplace(whole->view(), swarm::draw_part(*whole, random, swarm::kThinnedPart, settings.fit_points));
+    const std::vector<std::uint32_t> thinned = swarm::draw_part(*whole, random, swarm::kThinnedPart, settings.fit_points, &evaluator);
+    thin_rows.emplace(whole->view(), thinned, &evaluator);
     auto looked_at = survey(evaluator, thin_rows->view());
     if (!looked_at) return tl::unexpected(looked_at.error());
     thin = std::move(*looked_at);
@@ -204,7 +205,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   models::WorkingPoints& working = thin_rows ? thin : *whole;
   const bool searches_part = settings.searches_part(working.finite_count());
   const swarm::Part part =
-      swarm::look_closely(working, keenest(kinds), random, searches_part ? settings.search_points : swarm::kSampledFrom);
+      swarm::look_closely(working, keenest(kinds), random, searches_part ? settings.search_points : swarm::kSampledFrom, &evaluator);
   const std::size_t searched = searches_part ? part.points.index().size() : working.size();
   if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 

@@ -249,6 +249,7 @@ Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t rou
   std::vector<float> room;
   sampler.prefer_unexplained(levelled(caps, room), alive);
   scale_ = loss_of_nothing(caps);
+  swarm.share_work(evaluator_);
   if (!swarm.start(sampler, round, seeds)) {
     stop_reason_ = "complete: what is left determines no model";
     return false;

@@ -57,10 +57,21 @@ void sort_by_code(std::vector<Coded>& coded, int bits) {
   }
 }
 
-std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part) {
+/// some(first, last) for ranges of a length that is a multiple of 64 and together make up [0, count).
+template <class Some>
+void share(kernels::FitnessEvaluator* workers, std::size_t count, Some&& some) {
+  constexpr std::size_t kRange = 3072, kWorthwhile = 4096;  // of what takes a thread some nanoseconds each
+  if (workers == nullptr || count < kWorthwhile) return some(std::size_t{0}, count);
+  workers->share_out((count + kRange - 1) / kRange, [&](std::size_t k) { some(k * kRange, std::min(count, (k + 1) * kRange)); });
+}
+
+std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part,
+                                           kernels::FitnessEvaluator* workers) {
   const int bits = part.size() < points.finite_count() ? kSampleCellBits : kCellBits;
   std::vector<Coded> coded(part.size());
-  std::transform(part.begin(), part.end(), coded.begin(), [&](std::uint32_t i) { return Coded{morton(points, i, bits), i}; });
+  share(workers, part.size(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) coded[k] = {morton(points, part[k], bits), part[k]};
+  });
   sort_by_code(coded, bits * points.dimension());
   std::vector<std::uint32_t> index(coded.size());
   std::transform(coded.begin(), coded.end(), index.begin(), [](const Coded& one) { return one.index; });
@@ -79,63 +90,68 @@ void copy_rows(const std::byte* from, std::size_t stride, std::span<const std::u
 
 }  // namespace
 
-std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size) {
+std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
+                                     kernels::FitnessEvaluator* workers) {
   const std::size_t n = points.finite_count(), runs = std::min(n, size);
   std::vector<std::uint32_t> drawn(runs);
-  models::FiniteWalk walk = points.walk();
   // Run k begins at floor(n k / runs).
   const std::size_t whole = runs > 0 ? n / runs : 0, rest = runs > 0 ? n % runs : 0;
   // Where runs are short half a word tells a point: as even as one can see, for half the random numbers.
   constexpr std::size_t kShort = 1024;
   const bool halves = whole < kShort;
-  std::array<std::uint32_t, 8> words{};
-  std::size_t from = 0, over = 0;
-  std::uint32_t block = 0;
-  for (std::size_t k = 0; k < runs; ++block) {
-    const auto four = runs < n ? random.words(Draw::subset, number, 0, block) : std::array<std::uint32_t, 4>{};
-    for (std::size_t w = 0; w < 4; ++w) {
-      words[halves ? 2 * w : w] = four[w];
-      if (halves) words[2 * w + 1] = four[w] << 16;
+  const std::size_t at_once = halves ? 8 : 4;
+  share(workers, runs, [&](std::size_t first, std::size_t end) {
+    models::FiniteWalk walk = points.walk();
+    std::array<std::uint32_t, 8> words{};
+    std::size_t from = whole * first + rest * first / std::max<std::size_t>(runs, 1), over = rest * first % std::max<std::size_t>(runs, 1);
+    auto block = static_cast<std::uint32_t>(first / at_once);
+    for (std::size_t k = first; k < end; ++block) {
+      const auto four = runs < n ? random.words(Draw::subset, number, 0, block) : std::array<std::uint32_t, 4>{};
+      for (std::size_t w = 0; w < 4; ++w) {
+        words[halves ? 2 * w : w] = four[w];
+        if (halves) words[2 * w + 1] = four[w] << 16;
+      }
+      const std::size_t last = std::min(end, k + at_once);
+      for (std::size_t w = 0; k < last; ++k, ++w) {
+        over += rest;
+        const bool longer = over >= runs;
+        over -= longer ? runs : 0;
+        const std::size_t length = whole + (longer ? 1 : 0);
+        drawn[k] = walk.to(from + Random::below(words[w], length));
+        from += length;
+      }
     }
-    const std::size_t last = std::min(runs, k + (halves ? 8 : 4));
-    for (std::size_t w = 0; k < last; ++k, ++w) {
-      over += rest;
-      const bool longer = over >= runs;
-      over -= longer ? runs : 0;
-      const std::size_t length = whole + (longer ? 1 : 0);
-      drawn[k] = walk.to(from + Random::below(words[w], length));
-      from += length;
-    }
-  }
+  });
   return drawn;
 }
 
-Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index)
+Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index, kernels::FitnessEvaluator* workers)
     : scalar_(points.scalar == kernels::Scalar::float32 ? PointsView::Scalar::float32 : PointsView::Scalar::float64),
       dimension_(points.dimension),
       width_(static_cast<std::size_t>(points.dimension) * (points.scalar == kernels::Scalar::float32 ? sizeof(float) : sizeof(double))),
       bytes_(index.size() * width_) {
   const auto* const from = static_cast<const std::byte*>(points.data);
-  if (width_ == kUsual) {
-    copy_rows<kUsual>(from, points.stride, index, bytes_.data());
-  } else {
-    for (std::size_t k = 0; k < index.size(); ++k) std::memcpy(bytes_.data() + k * width_, from + index[k] * points.stride, width_);
-  }
+  share(workers, index.size(), [&](std::size_t first, std::size_t last) {
+    if (width_ == kUsual) return copy_rows<kUsual>(from, points.stride, index.subspan(first, last - first), bytes_.data() + first * width_);
+    for (std::size_t k = first; k < last; ++k) std::memcpy(bytes_.data() + k * width_, from + index[k] * points.stride, width_);
+  });
 }
 
 PointsView Rows::view() const noexcept { return {bytes_.data(), scalar_, dimension_, bytes_.size() / width_, width_}; }
 
-Subset::Subset(const models::WorkingPoints& points, const Random& random, std::size_t size)
-    : index_(in_morton_order(points, draw_part(points, random, kSearchedPart, size))), rows_(points.view(), index_) {}
+Subset::Subset(const models::WorkingPoints& points, const Random& random, std::size_t size, kernels::FitnessEvaluator* workers)
+    : index_(in_morton_order(points, draw_part(points, random, kSearchedPart, size, workers), workers)),
+      rows_(points.view(), index_, workers) {}
 
 void Subset::gather(std::span<const float> all, std::vector<float>& values) const {
   values.resize(index_.size());
   for (std::size_t k = 0; k < index_.size(); ++k) values[k] = all[index_[k]];
 }
 
-Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size) {
+Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
+                  kernels::FitnessEvaluator* workers) {
   constexpr std::size_t kNeighbours = 16;
-  Part part{Subset(points, random, size), {}};
+  Part part{Subset(points, random, size, workers), {}};
   const bool correspondences = points.dimension() > 3;
   if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
   if (space.agrees_by_normals()) {

@@ -10,19 +10,21 @@
 #include "host/models/neighbours.hpp"
 #include "host/models/working_points.hpp"
 #include "host/swarm/random.hpp"
+#include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::swarm {
 
 /// Input indices of at most `size` finite points, in input order: one drawn from each of equal runs, so that a scan or an image is covered
-/// evenly. All finite points where there are no more. Parts of different
-/// `number` are drawn independently.
+/// evenly. All finite points where there are no more. Parts of different `number` are drawn independently. `workers`, here and below, may be
+/// null: whose threads share the work.
 inline constexpr std::uint32_t kSearchedPart = 0, kThinnedPart = 1;
-std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size);
+std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
+                                     kernels::FitnessEvaluator* workers = nullptr);
 
 /// Rows of a cloud, copied as they are: a cloud of its own.
 class Rows {
  public:
-  Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index);
+  Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index, kernels::FitnessEvaluator* workers = nullptr);
 
   /// A view of memory that lives as long as this.
   PointsView view() const noexcept;
@@ -37,7 +39,7 @@ class Rows {
 /// What a swarm searches on while it looks around: a part of the cloud in Morton order, in which neighbours are neighbours in space.
 class Subset {
  public:
-  Subset(const models::WorkingPoints& points, const Random& random, std::size_t size);
+  Subset(const models::WorkingPoints& points, const Random& random, std::size_t size, kernels::FitnessEvaluator* workers = nullptr);
 
   /// Input indices, in Morton order.
   std::span<const std::uint32_t> index() const noexcept { return index_; }
@@ -63,6 +65,7 @@ struct Part {
 
 /// A part of `size` points at most, with neighbourhoods where the kind has use for them. Gives `points` the normals of the part where
 /// the kind looks at them.
-Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size);
+Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
+                  kernels::FitnessEvaluator* workers = nullptr);
 
 }  // namespace swarmfit::swarm

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "host/common/parallel.hpp"
-
 namespace swarmfit::swarm {
 
 double constriction(double c1, double c2) {
@@ -120,17 +118,18 @@ const models::Position& Swarm::attractor(std::size_t particle) const {
   return own_best_[best];
 }
 
+void Swarm::share_work(kernels::FitnessEvaluator& evaluator) {
+  const bool worth_waking = settings_.threads != 1 && space_.costly_samples();
+  workers_ = worth_waking || evaluator.shares(positions_.size()) ? &evaluator : nullptr;
+}
+
 void Swarm::for_particles(const std::function<void(std::size_t)>& body) const {
-  constexpr int kAtOnce = 8;
-  const auto range = [&](int first, int last) {
-    for (int j = first; j < last; ++j) body(static_cast<std::size_t>(j));
+  const std::size_t count = positions_.size(), at_once = workers_ == nullptr ? count : space_.costly_samples() ? 8 : 16;
+  const auto some = [&](std::size_t k) {
+    for (std::size_t j = k * at_once; j < std::min(count, (k + 1) * at_once); ++j) body(j);
   };
-  const auto count = static_cast<int>(positions_.size());
-  if (space_.costly_samples()) {
-    common::in_parallel(count, kAtOnce, settings_.threads, range);
-  } else {
-    range(0, count);
-  }
+  if (workers_ == nullptr) return some(0);
+  workers_->share_out((count + at_once - 1) / at_once, some);
 }
 
 void Swarm::move(const Sampler& sampler) {

@@ -31,6 +31,9 @@ class Swarm {
  public:
   Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random);
 
+  /// From now on particles are placed and moved side by side on the evaluator's threads, if these are awake anyway or a kind's samples take
+  /// long. The same places come out.
+  void share_work(kernels::FitnessEvaluator& evaluator);
   /// New particles from minimal samples, the first of them from `seeds`. False if the data yield no sample at all.
   bool start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds);
   /// Scores every particle, then moves it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
@@ -54,7 +57,7 @@ class Swarm {
   /// Puts a particle whose turn it is at a new sample; false where it is not, or the data yield none.
   bool renew(const Sampler& sampler, std::size_t particle);
   void fly(std::size_t particle);
-  /// Side by side where a kind's samples take long; what the body does with one particle must not matter to another.
+  /// What the body does with one particle must not matter to another.
   void for_particles(const std::function<void(std::size_t)>& body) const;
   const models::Position& attractor(std::size_t particle) const;
 
@@ -62,6 +65,7 @@ class Swarm {
   const Settings& settings_;
   const Random& random_;
   double chi_;
+  kernels::FitnessEvaluator* workers_ = nullptr;
   std::uint32_t round_ = 0;
   int steps_ = 0;
   int still_steps_ = 0;

@@ -137,6 +137,14 @@ class CpuEvaluator final : public FitnessEvaluator {
     });
   }
 
+  bool shares(std::size_t models) const noexcept override {
+    return crew_.threads() > 1 && worth_sharing(store_.finite(), models);
+  }
+
+  void share_out(std::size_t tasks, const std::function<void(std::size_t)>& body) override {
+    run_in(crew_, true, [&] { for_each_task(tasks, body); });
+  }
+
  private:
   /// Coefficients in the frame of the stored points; false if one is not finite.
   bool centre(const ModelView& model, float* k) const {
@@ -207,6 +215,10 @@ Result<> FitnessEvaluator::claim(const PointsView& points, std::span<const float
   if (auto ok = check_claim(points, tolerance, models, labels, evidence); !ok) return ok;
   return pass_on_cpu(points.count, [&](PointPasses& passes) { passes.claim(points, tolerance, models, labels, evidence); });
 }
+
+bool FitnessEvaluator::shares(std::size_t) const noexcept { return false; }
+
+void FitnessEvaluator::share_out(std::size_t tasks, const std::function<void(std::size_t)>& body) { for_each_task(tasks, body); }
 
 Result<std::unique_ptr<FitnessEvaluator>> make_cpu_evaluator(const EvaluatorOptions& options) {
   const auto threads = choose_threads(options.threads);
