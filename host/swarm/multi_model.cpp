@@ -218,7 +218,12 @@ bool MultiModel::too_few_left() const {
   // The paper's swarms end by themselves; and where labels are shared out, what a swarm in vain came to is on offer as well.
   if (settings_.deflation == Deflation::parametric || shares_out() || kinds_.size() > 1) return false;
   std::size_t left = 0;
-  for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * ground_.allowed_at(i) ? 1 : 0;
+  if (allowed_.empty()) {
+    const float least = kUnexplained * tau_;
+    left = static_cast<std::size_t>(std::count_if(caps_.begin(), caps_.end(), [&](float cap) { return cap >= least; }));
+  } else {
+    for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * allowed_[i] ? 1 : 0;
+  }
   return static_cast<double>(left) < (may_share() ? kOwnShare : 1.0) * static_cast<double>(settings_.min_inliers);
 }
 
@@ -415,6 +420,12 @@ Expected<> MultiModel::sink(const Candidate& candidate, std::vector<float>& caps
   }
   return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
     const std::span<const float> level = levelled(distances, room);
+    if (allowed_.empty() && reaches.empty()) {
+      const kernels::Sinking how{beside_reach(tau_), static_cast<float>(reach) * tau_, static_cast<float>(settings_.dead_zone_slope)};
+      const std::size_t n = distances.size();
+      const auto nearest = std::span(near.nearest).subspan(near.nearest.empty() ? 0 : first, near.nearest.empty() ? 0 : n);
+      return kernels::sink(distances, how, std::span(near.beside).subspan(first, n), nearest, std::span(caps).subspan(first, n));
+    }
     mark_beside(level, tau_, std::span(near.beside).subspan(first, distances.size()));
     if (!near.nearest.empty()) take_nearer(level, std::span(near.nearest).subspan(first, distances.size()));
     swarm::deflate(distances, tau_, reach, settings_.dead_zone_slope, std::span(caps).subspan(first, distances.size()), allowed_, reaches);

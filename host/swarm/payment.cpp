@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 namespace swarmfit::swarm {
@@ -14,31 +15,21 @@ double saved(std::span<const float> caps, std::span<const float> distances) {
 }
 
 void mark_beside(std::span<const float> distances, float tau, std::span<std::uint8_t> beside) {
-  const float reach = static_cast<float>(Support::kSlabs) * tau;
+  const float reach = beside_reach(tau);
   for (std::size_t i = 0; i < beside.size(); ++i) beside[i] |= distances[i] < reach ? 1 : 0;
 }
 
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside,
                       const Support& before, std::span<const float> nearest) {
-  // The last place is for all that is farther, or NaN; one more for what is explained already.
-  constexpr auto kFarther = static_cast<float>(Support::kSlabs);
-  std::array<std::size_t, Support::kSlabs + 2> counts{};
-  const float half = 0.5F * tau, least = kUnexplained * tau, reach = kFarther * tau, per_tau = 1 / tau;
+  kernels::SlabCounts counts;
+  kernels::count_slabs({distances, caps, beside, nearest, tau, kUnexplained * tau}, counts);
   Support s = before;
-  for (std::size_t i = 0; i < distances.size(); ++i) {
-    const float d = distances[i];
-    const bool unexplained = caps[i] >= least && !std::isnan(d);
-    const float slab = d < reach ? d * per_tau : kFarther;
-    const std::size_t place = unexplained ? static_cast<std::size_t>(std::min(slab, kFarther)) : Support::kSlabs + 1;
-    ++counts[place];
-    s.shared += !unexplained && d < tau && !nearest.empty() && nearest[i] < tau && d < nearest[i] ? 1 : 0;
-    if (place != 0) continue;
-    s.square += static_cast<double>(d) * static_cast<double>(d);
-    s.inner += d < half ? 1 : 0;
-    s.beside += beside.empty() ? 0 : beside[i];
-  }
-  s.unexplained += distances.size() - counts[Support::kSlabs + 1];
-  for (std::size_t k = 0; k < Support::kSlabs; ++k) s.slabs[k] += counts[k];
+  s.unexplained += counts.open;
+  std::transform(counts.slabs.begin(), counts.slabs.end(), s.slabs.begin(), s.slabs.begin(), std::plus<>());
+  s.square += counts.square;
+  s.inner += counts.inner;
+  s.beside += counts.marked;
+  s.shared += counts.shared;
   return s;
 }
 

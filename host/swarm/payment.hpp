@@ -7,12 +7,13 @@
 #include <span>
 
 #include "host/swarm/settings.hpp"
+#include "kernels/point_tallies.hpp"
 
 namespace swarmfit::swarm {
 
 /// What a candidate explains of what nobody has explained yet.
 struct Support {
-  static constexpr std::size_t kSlabs = 7;
+  static constexpr std::size_t kSlabs = kernels::SlabCounts::kSlabs;
   std::size_t unexplained = 0;              ///< all unexplained points
   std::array<std::size_t, kSlabs> slabs{};  ///< those less than tau away, those from there to 2 tau, and so on
   double square = 0;                        ///< sum of the squared distances of the first slab [data unit^2]
@@ -42,6 +43,7 @@ Support count_support(std::span<const float> distances, std::span<const float> c
 
 /// Marks, with 1, points less than kSlabs tau from a model that was found. NaN is not.
 void mark_beside(std::span<const float> distances, float tau, std::span<std::uint8_t> beside);
+inline constexpr float beside_reach(float tau) noexcept { return static_cast<float>(Support::kSlabs) * tau; }
 
 /// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
 /// binomial tail, background density from the band or from all slabs beyond the first, whichever is denser, one test for each minimal

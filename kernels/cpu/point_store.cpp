@@ -135,9 +135,10 @@ void PointStore::sort() {
 std::optional<std::size_t> PointStore::bad_cap(std::span<const float> caps) const noexcept {
   const auto good = [](float cap) { return cap >= 0 && cap <= std::numeric_limits<float>::max(); };
   if (input_.empty()) {
-    bool all = true;
-    for (std::size_t i = 0; i < finite_; ++i) all &= good(caps[i]);
-    if (all) return std::nullopt;
+    int bad = 0;
+#pragma omp simd reduction(+ : bad)
+    for (std::size_t i = 0; i < finite_; ++i) bad += good(caps[i]) ? 0 : 1;
+    if (bad == 0) return std::nullopt;
   }
   for (std::size_t i = 0; i < finite_; ++i) {
     if (!good(caps[input_index(i)])) return input_index(i);
@@ -150,18 +151,14 @@ void PointStore::set_caps(std::span<const float> caps) {
   std::vector<float> most((finite_ + kChunkRows - 1) / kChunkRows);
   for_each_task(most.size(), [&](std::size_t chunk) {
     const std::size_t first = chunk * kChunkRows, last = std::min(finite_, first + kChunkRows);
-    float most_here = 0;
     if (input_.empty()) {
-      for (std::size_t i = first; i < last; ++i) {
-        caps_[i] = caps[i];
-        most_here = std::max(most_here, caps[i]);
-      }
+      std::copy(caps.begin() + static_cast<std::ptrdiff_t>(first), caps.begin() + static_cast<std::ptrdiff_t>(last), &caps_[first]);
     } else {
-      for (std::size_t i = first; i < last; ++i) {
-        caps_[i] = caps[input_[i]];
-        most_here = std::max(most_here, caps_[i]);
-      }
+      for (std::size_t i = first; i < last; ++i) caps_[i] = caps[input_[i]];
     }
+    float most_here = 0;
+#pragma omp simd reduction(max : most_here)
+    for (std::size_t i = first; i < last; ++i) most_here = std::max(most_here, caps_[i]);
     most[chunk] = most_here;
   });
   most_cap_ = most.empty() ? 0.0F : *std::max_element(most.begin(), most.end());

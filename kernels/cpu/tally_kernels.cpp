@@ -1,0 +1,202 @@
+// Tallies on vectors, compiled once for each instruction set.
+#define HWY_COMPILE_ALL_ATTAINABLE
+#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)  // as in cpu_kernels.cpp
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "kernels/cpu/tally_kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "kernels/cpu/tally_kernels.hpp"
+
+HWY_BEFORE_NAMESPACE();
+namespace swarmfit::kernels::cpu {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using FloatTag = hn::ScalableTag<float>;
+using IntTag = hn::RebindToSigned<FloatTag>;
+using ByteTag = hn::Rebind<std::uint8_t, FloatTag>;
+using DoubleTag = hn::ScalableTag<double>;
+using Vector = hn::Vec<FloatTag>;
+using Wide = hn::Vec<DoubleTag>;
+using Integers = hn::Vec<IntTag>;
+using Mask = hn::Mask<FloatTag>;
+constexpr std::size_t kLanes = HWY_LANES(float);
+
+/// As SlabCounts, a lane each.
+struct LaneCounts {
+  Integers open, inner, marked, shared, slabs[SlabCounts::kSlabs];
+  Wide square;
+
+  HWY_INLINE LaneCounts() {
+    open = inner = marked = shared = hn::Zero(IntTag());
+    for (Integers& slab : slabs) slab = hn::Zero(IntTag());
+    square = hn::Zero(DoubleTag());
+  }
+
+  HWY_INLINE void add_square(Vector v) {
+    const DoubleTag d;
+#if HWY_TARGET == HWY_SCALAR
+    const Wide wide = hn::PromoteTo(d, v);
+#else
+    const hn::Rebind<float, DoubleTag> narrow;
+    const Wide low = hn::PromoteTo(d, hn::LowerHalf(narrow, v)), wide = hn::PromoteTo(d, hn::UpperHalf(narrow, v));
+    square = hn::MulAdd(low, low, square);
+#endif
+    square = hn::MulAdd(wide, wide, square);
+  }
+  HWY_INLINE void finish(SlabCounts& counts) {
+    const auto total = [](Integers v) HWY_ATTR { return static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(IntTag(), v))); };
+    counts.square += hn::GetLane(hn::SumOfLanes(DoubleTag(), square));
+    counts.open += total(open);
+    counts.inner += total(inner);
+    counts.marked += total(marked);
+    counts.shared += total(shared);
+    for (std::size_t k = 0; k < SlabCounts::kSlabs; ++k) counts.slabs[k] += total(slabs[k]);
+  }
+};
+
+HWY_INLINE Integers ones_where(Mask mask) { return hn::IfThenElseZero(hn::RebindMask(IntTag(), mask), hn::Set(IntTag(), 1)); }
+
+/// What is asked of each point, a lane each.
+struct Widths {
+  Vector width, half, reach, per_width, least_cap, farther;
+
+  HWY_INLINE explicit Widths(const SlabsView& view) {
+    const FloatTag d;
+    width = hn::Set(d, view.width);
+    half = hn::Set(d, 0.5F * view.width);
+    farther = hn::Set(d, static_cast<float>(SlabCounts::kSlabs));
+    reach = hn::Set(d, static_cast<float>(SlabCounts::kSlabs) * view.width);
+    per_width = hn::Set(d, 1 / view.width);
+    least_cap = hn::Set(d, view.least_cap);
+  }
+};
+
+HWY_INLINE void count_vector(const Widths& w, Vector distance, Vector cap, const std::uint8_t* HWY_RESTRICT marks,
+                             const float* HWY_RESTRICT others, LaneCounts& counts) {
+  const FloatTag d;
+  const IntTag bits;
+  const Mask open = hn::And(hn::Ge(cap, w.least_cap), hn::Eq(distance, distance));
+  counts.open = hn::Add(counts.open, ones_where(open));
+  const Vector slab = hn::IfThenElse(hn::Lt(distance, w.reach), hn::Mul(distance, w.per_width), w.farther);
+  const Integers place = hn::ConvertTo(bits, hn::IfThenElse(open, hn::Min(slab, w.farther), w.farther));
+  for (std::size_t k = 0; k < SlabCounts::kSlabs; ++k) {
+    const auto there = hn::Eq(place, hn::Set(bits, static_cast<std::int32_t>(k)));
+    counts.slabs[k] = hn::Add(counts.slabs[k], hn::IfThenElseZero(there, hn::Set(bits, 1)));
+  }
+  const Mask first = hn::RebindMask(d, hn::Eq(place, hn::Zero(bits)));
+  if (others != nullptr) {
+    const Vector other = hn::LoadU(d, others);
+    const Mask near = hn::And(hn::Lt(distance, w.width), hn::And(hn::Lt(other, w.width), hn::Lt(distance, other)));
+    counts.shared = hn::Add(counts.shared, ones_where(hn::And(near, hn::Not(open))));
+  }
+  if (hn::AllFalse(d, first)) return;
+  counts.add_square(hn::IfThenElseZero(first, distance));
+  counts.inner = hn::Add(counts.inner, ones_where(hn::And(first, hn::Lt(distance, w.half))));
+  if (marks != nullptr) {
+    const Integers marked = hn::PromoteTo(bits, hn::LoadU(ByteTag(), marks));
+    counts.marked = hn::Add(counts.marked, hn::IfThenElseZero(hn::RebindMask(bits, first), marked));
+  }
+}
+
+void count_slabs(const SlabsView& view, SlabCounts& counts) {
+  const FloatTag d;
+  const Widths widths(view);
+  const std::size_t n = view.distances.size(), whole = n - n % kLanes;
+  const float *const distances = view.distances.data(), *const caps = view.caps.data();
+  const std::uint8_t* const marks = view.marks.empty() ? nullptr : view.marks.data();
+  const float* const others = view.others.empty() ? nullptr : view.others.data();
+  LaneCounts lanes;
+  for (std::size_t i = 0; i < whole; i += kLanes) {
+    count_vector(widths, hn::LoadU(d, distances + i), hn::LoadU(d, caps + i), marks != nullptr ? marks + i : nullptr,
+                 others != nullptr ? others + i : nullptr, lanes);
+  }
+  if (whole < n) {
+    HWY_ALIGN float last_distances[kLanes], last_caps[kLanes] = {}, last_others[kLanes] = {};
+    HWY_ALIGN std::uint8_t last_marks[kLanes] = {};
+    std::fill(last_distances, last_distances + kLanes, std::numeric_limits<float>::quiet_NaN());
+    std::copy(distances + whole, distances + n, last_distances);
+    std::copy(caps + whole, caps + n, last_caps);
+    if (marks != nullptr) std::copy(marks + whole, marks + n, last_marks);
+    if (others != nullptr) std::copy(others + whole, others + n, last_others);
+    count_vector(widths, hn::Load(d, last_distances), hn::Load(d, last_caps), marks != nullptr ? last_marks : nullptr,
+                 others != nullptr ? last_others : nullptr, lanes);
+  }
+  lanes.finish(counts);
+}
+
+struct SinkVectors {
+  Vector reach, level, slope;
+};
+
+HWY_INLINE void sink_vector(const SinkVectors& how, const float* distances, std::uint8_t* marks, float* others, float* caps) {
+  const FloatTag d;
+  const Vector distance = hn::LoadU(d, distances);
+  const auto mark = hn::DemoteTo(ByteTag(), ones_where(hn::Lt(distance, how.reach)));
+  hn::StoreU(hn::Or(hn::LoadU(ByteTag(), marks), mark), ByteTag(), marks);
+  if (others != nullptr) {
+    const Vector before = hn::LoadU(d, others);
+    hn::StoreU(hn::IfThenElse(hn::Lt(distance, before), distance, before), d, others);
+  }
+  const Vector cap = hn::LoadU(d, caps), left = hn::Mul(how.slope, hn::Sub(distance, how.level));
+  const Vector less = hn::IfThenElseZero(hn::Gt(left, hn::Zero(d)), left);
+  hn::StoreU(hn::IfThenElse(hn::Lt(left, cap), less, cap), d, caps);
+}
+
+void sink(std::span<const float> distances, const Sinking& how, std::uint8_t* marks, float* others, float* caps) {
+  const FloatTag d;
+  const SinkVectors vectors{hn::Set(d, how.reach), hn::Set(d, how.level), hn::Set(d, how.slope)};
+  const std::size_t n = distances.size(), whole = n - n % kLanes;
+  for (std::size_t i = 0; i < whole; i += kLanes) {
+    sink_vector(vectors, distances.data() + i, marks + i, others != nullptr ? others + i : nullptr, caps + i);
+  }
+  if (whole == n) return;
+  HWY_ALIGN float last_distances[kLanes] = {}, last_caps[kLanes] = {}, last_others[kLanes] = {};
+  HWY_ALIGN std::uint8_t last_marks[kLanes] = {};
+  std::copy(distances.begin() + static_cast<std::ptrdiff_t>(whole), distances.end(), last_distances);
+  std::copy(caps + whole, caps + n, last_caps);
+  std::copy(marks + whole, marks + n, last_marks);
+  if (others != nullptr) std::copy(others + whole, others + n, last_others);
+  sink_vector(vectors, last_distances, last_marks, others != nullptr ? last_others : nullptr, last_caps);
+  std::copy(last_caps, last_caps + (n - whole), caps + whole);
+  std::copy(last_marks, last_marks + (n - whole), marks + whole);
+  if (others != nullptr) std::copy(last_others, last_others + (n - whole), others + whole);
+}
+
+const TallyKernels& tally_kernels() {
+  static const TallyKernels table{hwy::TargetName(HWY_TARGET), count_slabs, sink};
+  return table;
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace swarmfit::kernels::cpu
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+#include "kernels/cpu/dispatch_table.hpp"
+
+namespace swarmfit::kernels {
+namespace cpu {
+
+HWY_EXPORT(tally_kernels);
+
+const std::vector<const TallyKernels*>& available_tally_kernels() {
+  static const std::vector<const TallyKernels*> all = runnable(HWY_DISPATCH_TABLE(tally_kernels));
+  return all;
+}
+
+}  // namespace cpu
+
+void count_slabs(const SlabsView& view, SlabCounts& counts) { cpu::available_tally_kernels().front()->count_slabs(view, counts); }
+
+void sink(std::span<const float> distances, const Sinking& how, std::span<std::uint8_t> marks, std::span<float> others,
+          std::span<float> caps) {
+  cpu::available_tally_kernels().front()->sink(distances, how, marks.data(), others.empty() ? nullptr : others.data(), caps.data());
+}
+
+}  // namespace swarmfit::kernels
+#endif  // HWY_ONCE

@@ -1,0 +1,41 @@
+// Sums and marks over what is known of points already, one number a point, in the caller's memory: on vectors, on the caller's thread.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace swarmfit::kernels {
+
+/// Points on both sides of a model in slabs of one width: those less than it away, those from there to twice it, and so on.
+struct SlabCounts {
+  static constexpr std::size_t kSlabs = 7;
+  std::size_t open = 0;  ///< all open points
+  std::array<std::size_t, kSlabs> slabs{};
+  double square = 0;       ///< of the first slab: sum of the squared distances
+  std::size_t inner = 0;   ///< of the first slab, those less than half its width away
+  std::size_t marked = 0;  ///< of the first slab, those that are marked
+  std::size_t shared = 0;  ///< points that are not open, less than the width away, and nearer than to another model that is as near
+};
+
+/// What there is to count: one value a point, NaN a distance that counts for nothing. A point is open while its cap is at least `least_cap`.
+struct SlabsView {
+  std::span<const float> distances, caps;
+  std::span<const std::uint8_t> marks;  ///< empty, or 0 or 1 a point
+  std::span<const float> others;        ///< empty, and no point is shared, or distances to another model
+  float width = 0, least_cap = 0;
+};
+
+/// Adds to the counts.
+void count_slabs(const SlabsView& view, SlabCounts& counts);
+
+/// What a found model leaves of the points it explains. For points less than `reach` away marks[i] = 1; others[i], where there are any, is the
+/// less of itself and the distance; caps[i] is at most slope (distance - level), and at least 0. NaN changes nothing.
+struct Sinking {
+  float reach = 0, level = 0, slope = 0;
+};
+void sink(std::span<const float> distances, const Sinking& how, std::span<std::uint8_t> marks, std::span<float> others,
+          std::span<float> caps);
+
+}  // namespace swarmfit::kernels
