@@ -1,6 +1,7 @@
 #include "host/swarm/multi_model.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -21,6 +22,20 @@ constexpr double kStable = 0.01;                    // spread of the list of glo
 constexpr double kAlike = 0.02;                     // share of their saving by which the bests of two swarms that found the same may differ
 constexpr int kFullRounds = 1;                      // of refinement on all points, where it was done on a part of them before
 constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
+
+/// In lanes: one addition need not wait for the one before.
+double sum_of(std::span<const float> values) {
+  constexpr std::size_t kLanes = 8;
+  std::array<double, kLanes> lanes{};
+  const std::size_t even = values.size() / kLanes * kLanes;
+  for (std::size_t i = 0; i < even; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) lanes[k] += static_cast<double>(values[i + k]);
+  }
+  double sum = 0;
+  for (const double lane : lanes) sum += lane;
+  for (std::size_t i = even; i < values.size(); ++i) sum += static_cast<double>(values[i]);
+  return sum;
+}
 
 }  // namespace
 
@@ -218,12 +233,7 @@ bool MultiModel::too_few_left() const {
   // The paper's swarms end by themselves; and where labels are shared out, what a swarm in vain came to is on offer as well.
   if (settings_.deflation == Deflation::parametric || shares_out() || kinds_.size() > 1) return false;
   std::size_t left = 0;
-  if (allowed_.empty()) {
-    const float least = kUnexplained * tau_;
-    left = static_cast<std::size_t>(std::count_if(caps_.begin(), caps_.end(), [&](float cap) { return cap >= least; }));
-  } else {
-    for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * allowed_[i] ? 1 : 0;
-  }
+  for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * ground_.allowed_at(i) ? 1 : 0;
   return static_cast<double>(left) < (may_share() ? kOwnShare : 1.0) * static_cast<double>(settings_.min_inliers);
 }
 
@@ -242,8 +252,7 @@ double MultiModel::loss_of_nothing(std::span<const float> caps) const {
     }
     return sum;
   }
-  for (const float cap : part_searched_ ? std::span<const float>(part_caps_) : caps) sum += static_cast<double>(cap);
-  return sum;
+  return sum_of(part_searched_ ? std::span<const float>(part_caps_) : caps);
 }
 
 Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,

@@ -122,19 +122,29 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
   return best;
 }
 
-Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models) {
-  // In one pass: the points are loaded once for all models.
+namespace {
+
+/// Distances to the first model, then to the second, and so on; in one pass, for which the points are loaded once.
+Expected<std::vector<float>> measure_in_rows(const Ground& ground, std::span<const models::Placed> models) {
   ModelRows rows(ground.points.frame(), models.size());
   for (const auto& [space, theta] : models) rows.add(*space, theta);
-  const std::size_t points = ground.size();
-  std::vector<float> all(points * models.size());
+  std::vector<float> all(ground.size() * models.size());
   std::vector<kernels::Evidence> evidence(models.size());
   if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), rows.views(), all, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
+  return all;
+}
+
+}  // namespace
+
+Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models) {
+  const auto all = measure_in_rows(ground, models);
+  if (!all) return tl::unexpected(all.error());
+  const std::size_t points = ground.size();
   std::vector<std::vector<float>> distances(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
-    const auto first = all.begin() + static_cast<std::ptrdiff_t>(m * points);
+    const auto first = all->begin() + static_cast<std::ptrdiff_t>(m * points);
     distances[m].assign(first, first + static_cast<std::ptrdiff_t>(points));
   }
   return distances;
@@ -183,21 +193,29 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed
 }
 
 Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
-  constexpr std::uint16_t kSeveral = 65535;
-  std::vector<std::uint16_t> owner(ground.size(), 0);
-  const auto all = measure(ground, models);
+  constexpr std::uint32_t kNobody = 0, kSeveral = ~std::uint32_t{0};
+  const auto all = measure_in_rows(ground, models);
   if (!all) return tl::unexpected(all.error());
+  const std::size_t points = ground.size();
+  std::vector<std::uint32_t> owner(points, kNobody);
   for (std::size_t m = 0; m < models.size(); ++m) {
-    const std::vector<float>& distances = (*all)[m];
-    const auto mine = static_cast<std::uint16_t>(m + 1);
-    for (std::size_t i = 0; i < owner.size(); ++i) {
-      const std::uint16_t taken = owner[i] == 0 ? mine : kSeveral;
-      owner[i] = distances[i] <= ground.allowed_at(i) ? taken : owner[i];
+    const float* const distances = all->data() + m * points;
+    const auto mine = static_cast<std::uint32_t>(m + 1);
+    const auto claim = [&](auto&& allowed) {
+      for (std::size_t i = 0; i < points; ++i) {
+        const std::uint32_t taken = owner[i] == kNobody ? mine : kSeveral;
+        owner[i] = distances[i] <= allowed(i) ? taken : owner[i];
+      }
+    };
+    if (ground.allowed.empty()) {
+      claim([tau = ground.tau](std::size_t) { return tau; });
+    } else {
+      claim([&](std::size_t i) { return ground.allowed[i]; });
     }
   }
   std::vector<std::size_t> unique(models.size(), 0);
-  for (const std::uint16_t m : owner) {
-    if (m != 0 && m != kSeveral) ++unique[m - 1U];
+  for (const std::uint32_t m : owner) {
+    if (m != kNobody && m != kSeveral) ++unique[m - 1U];
   }
   return unique;
 }

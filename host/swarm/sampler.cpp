@@ -24,14 +24,11 @@ Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint3
 }
 
 void Sampler::prefer_unexplained(std::span<const float> caps, float least) {
-  live_.resize(candidates_.size());
-  std::size_t alive = 0;
+  live_.clear();
   for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
     alive_[place] = caps[candidates_[place]] >= least ? 1 : 0;
-    live_[alive] = place;  // stays if it is alive
-    alive += alive_[place];
+    if (alive_[place] != 0) live_.push_back(place);
   }
-  live_.resize(alive);
   if (live_.size() >= static_cast<std::size_t>(4 * space_.minimal_sample())) return;
   live_.resize(candidates_.size());
   std::iota(live_.begin(), live_.end(), 0U);
