@@ -19,7 +19,7 @@ struct SlabCounts {
   std::size_t shared = 0;  ///< points that are not open, less than the width away, and nearer than to another model that is as near
 };
 
-/// What there is to count: one value a point, NaN a distance that counts for nothing. A point is open while its cap is at least `least_cap`.
+/// What there is to count: one value a point, NaN a distance that counts for nothing. A point is open if its cap is at least `least_cap`.
 struct SlabsView {
   std::span<const float> distances, caps;
   std::span<const std::uint8_t> marks;  ///< empty, or 0 or 1 a point
@@ -30,7 +30,7 @@ struct SlabsView {
 /// Adds to the counts.
 void count_slabs(const SlabsView& view, SlabCounts& counts);
 
-/// What a found model leaves of the points it explains. For points less than `reach` away marks[i] = 1; others[i], where there are any, is the
+/// What a found model leaves of the points it explains. For those less than `reach` away marks[i] = 1; others[i], if there are any, is the
 /// less of itself and the distance; caps[i] is at most slope (distance - level), and at least 0. NaN changes nothing.
 struct Sinking {
   float reach = 0, level = 0, slope = 0;

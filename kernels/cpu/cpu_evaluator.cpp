@@ -137,9 +137,7 @@ class CpuEvaluator final : public FitnessEvaluator {
     });
   }
 
-  bool shares(std::size_t models) const noexcept override {
-    return crew_.threads() > 1 && worth_sharing(store_.finite(), models);
-  }
+  bool shares(std::size_t models) const noexcept override { return crew_.threads() > 1 && worth_sharing(store_.finite(), models); }
 
   void share_out(std::size_t tasks, const std::function<void(std::size_t)>& body) override {
     run_in(crew_, true, [&] { for_each_task(tasks, body); });

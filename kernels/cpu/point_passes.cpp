@@ -100,7 +100,7 @@ struct Bench {
     cut(points);
     fetch_probes(points, first + kStripPoints);
     return points.scalar == Scalar::float32 ? survey_as<float>(kernels, look, points, sums)
-                                             : survey_as<double>(kernels, look, points, sums);
+                                            : survey_as<double>(kernels, look, points, sums);
   }
 
   /// What was found for the strip's rows to where the caller has a place for each of his; `nothing` for those that are not in it.
