@@ -99,6 +99,25 @@ TEST_P(Costs, FollowNewCapsAndNewClouds) {
 }
 
 // Many equal caps are where plain float sums drift: every addition rounds the same way.
+TEST_P(Costs, FollowCapsThatGoAndComeBack) {
+  for (const ModelKind kind : kModelKinds) {
+    const Cloud before = make_cloud(kind, 5000);
+    Cloud cloud = before;
+    load(cloud);
+    const std::vector<double> swarm = make_swarm(kind, 64);
+    const std::vector<float> all = costs(kind, swarm, Loss::truncated_l1);
+    for (const double gone : {0.3, 0.97, 0.0, 0.6, 1.0, 0.0}) {
+      SCOPED_TRACE(std::string(traits(kind).name) + ", share of caps that are 0: " + std::to_string(gone));
+      Random random(7);
+      for (std::size_t i = 0; i < cloud.count(); ++i) cloud.caps[i] = random() < gone ? 0.0F : before.caps[i];
+      ASSERT_OK(evaluator().set_caps(cloud.caps));
+      ASSERT_OK(reference().set_caps(cloud.caps));
+      for (const Loss loss : kLosses) expect_costs_agree(cloud, kind, swarm, loss, 12);
+    }
+    EXPECT_EQ(costs(kind, swarm, Loss::truncated_l1), all) << "where nothing is gone, nothing has changed";
+  }
+}
+
 TEST_P(Costs, DoNotDriftOverEqualTerms) {
   for (const float cap : {0.01F, 0.013F, 0.1F}) {
     Cloud cloud = make_cloud(ModelKind::plane, 307200);

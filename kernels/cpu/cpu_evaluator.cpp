@@ -74,7 +74,7 @@ class CpuEvaluator final : public FitnessEvaluator {
       centre(swarm);
       const CentredSwarm centred{swarm.kind, swarm.count, coefficients_, finite_, cutoffs};
       const auto work = [&] { effort_.touched += costs_.evaluate(store_, centred, loss, costs); };
-      run_in(crew_, worth_sharing(store_.finite(), swarm.count), work);
+      run_in(crew_, worth_sharing(store_.costly(), swarm.count), work);
       effort_.evaluations += swarm.count;
       effort_.point_models += swarm.count * store_.finite();
     });

@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kChunkRows = 16384;
 /// Points of a cloud whose memory counts for more than the time to ask for it anew.
 constexpr std::size_t kLarge = std::size_t{1} << 20;
+/// Share of the points that may cost something from which on leaving out the others does not pay for the copy.
+constexpr double kMostCostly = 0.8;
 
 /// Calls visit(row, values) for each finite row in [first, last), with `values` its `Width` columns.
 template <class S, std::size_t Width, class Visit>
@@ -53,6 +55,7 @@ void PointStore::assign(const PointsView& points) {
   count_ = points.count;
   most_cap_ = 0;
   bounds_current_ = false;
+  apart_ = false;
   std::vector<Chunk> chunks((count_ + kChunkRows - 1) / kChunkRows);
   for_each_task(chunks.size(), [&](std::size_t chunk) {
     Chunk summary;
@@ -74,21 +77,22 @@ void PointStore::assign(const PointsView& points) {
     for (std::size_t c = 0; c < kMaxDimension; ++c) centre_[c] += chunk.sum[c] / static_cast<double>(finite_ > 0 ? finite_ : 1);
   }
   keep_finite(points, chunks);
-  if (dimension_ <= 3 && blocks_ > 1 && !points.ordered) sort();
-  caps_.assign(blocks_ * kBlockPoints, 0.0F);  // after the sort, whose memory is free again
+  if (dimension_ <= 3 && all_.blocks > 1 && !points.ordered) sort();
+  all_.caps.assign(all_.blocks * kBlockPoints, 0.0F);  // after the sort, whose memory is free again
 }
 
 void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunks) {
-  blocks_ = (finite_ + kBlockPoints - 1) / kBlockPoints;
-  const std::size_t padded = blocks_ * kBlockPoints;
+  all_.points = finite_;
+  all_.blocks = (finite_ + kBlockPoints - 1) / kBlockPoints;
+  const std::size_t padded = all_.blocks * kBlockPoints;
   const auto width = static_cast<std::size_t>(dimension_);
-  for (std::size_t c = 0; c < kMaxDimension; ++c) columns_[c].resize(c < width ? padded : 0);
+  for (std::size_t c = 0; c < kMaxDimension; ++c) all_.columns[c].resize(c < width ? padded : 0);
   input_.resize(finite_ == count_ ? 0 : finite_);
   for_each_task(chunks.size(), [&](std::size_t chunk) {
     std::size_t position = chunks[chunk].start;
     std::array<float, kMaxDimension> reach{};
     std::array<float*, kMaxDimension> columns{};
-    for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
+    for (std::size_t c = 0; c < width; ++c) columns[c] = all_.columns[c].data();
     std::uint32_t* const input = input_.empty() ? nullptr : input_.data();
     visit_chunk(points, chunk, [&](std::size_t row, const auto& x) {
       for (std::size_t c = 0; c < x.size(); ++c) {
@@ -105,13 +109,14 @@ void PointStore::keep_finite(const PointsView& points, std::vector<Chunk>& chunk
   for (const Chunk& chunk : chunks) {
     for (std::size_t c = 0; c < width; ++c) reach_[c] = std::max(reach_[c], chunk.reach[c]);
   }
-  for (std::size_t c = 0; c < width; ++c) std::fill(columns_[c].begin() + static_cast<std::ptrdiff_t>(finite_), columns_[c].end(), 0.0F);
+  for (std::size_t c = 0; c < width; ++c)
+    std::fill(all_.columns[c].begin() + static_cast<std::ptrdiff_t>(finite_), all_.columns[c].end(), 0.0F);
 }
 
 void PointStore::sort() {
   const auto width = static_cast<std::size_t>(dimension_);
   std::array<const float*, kMaxDimension> columns{};
-  for (std::size_t c = 0; c < width; ++c) columns[c] = columns_[c].data();
+  for (std::size_t c = 0; c < width; ++c) columns[c] = all_.columns[c].data();
   morton_.sort(std::span(columns).first(width), finite_, order_);
   const auto each = [&](auto&& body) {
     for_each_task((finite_ + kChunkRows - 1) / kChunkRows, [&](std::size_t chunk) {
@@ -119,10 +124,10 @@ void PointStore::sort() {
     });
   };
   for (std::size_t c = 0; c < width; ++c) {
-    unsorted_.resize(columns_[c].size());
-    unsorted_.swap(columns_[c]);
-    std::fill(columns_[c].begin() + static_cast<std::ptrdiff_t>(finite_), columns_[c].end(), 0.0F);
-    each([&](std::size_t i) { columns_[c][i] = unsorted_[order_[i]]; });
+    unsorted_.resize(all_.columns[c].size());
+    unsorted_.swap(all_.columns[c]);
+    std::fill(all_.columns[c].begin() + static_cast<std::ptrdiff_t>(finite_), all_.columns[c].end(), 0.0F);
+    each([&](std::size_t i) { all_.columns[c][i] = unsorted_[order_[i]]; });
   }
   if (!input_.empty()) each([&](std::size_t i) { order_[i] = input_[order_[i]]; });
   input_.swap(order_);
@@ -149,19 +154,49 @@ std::optional<std::size_t> PointStore::bad_cap(std::span<const float> caps) cons
 void PointStore::set_caps(std::span<const float> caps) {
   bounds_current_ = false;
   std::vector<float> most((finite_ + kChunkRows - 1) / kChunkRows);
+  std::vector<std::size_t> costly(most.size());
   for_each_task(most.size(), [&](std::size_t chunk) {
     const std::size_t first = chunk * kChunkRows, last = std::min(finite_, first + kChunkRows);
+    float* const kept = all_.caps.data();
     if (input_.empty()) {
-      std::copy(caps.begin() + static_cast<std::ptrdiff_t>(first), caps.begin() + static_cast<std::ptrdiff_t>(last), &caps_[first]);
+      std::copy(caps.begin() + static_cast<std::ptrdiff_t>(first), caps.begin() + static_cast<std::ptrdiff_t>(last), kept + first);
     } else {
-      for (std::size_t i = first; i < last; ++i) caps_[i] = caps[input_[i]];
+      for (std::size_t i = first; i < last; ++i) kept[i] = caps[input_[i]];
     }
     float most_here = 0;
-#pragma omp simd reduction(max : most_here)
-    for (std::size_t i = first; i < last; ++i) most_here = std::max(most_here, caps_[i]);
+    std::uint32_t costly_here = 0;
+#pragma omp simd reduction(max : most_here) reduction(+ : costly_here)
+    for (std::size_t i = first; i < last; ++i) {
+      most_here = std::max(most_here, kept[i]);
+      costly_here += kept[i] > 0 ? 1U : 0U;
+    }
     most[chunk] = most_here;
+    costly[chunk] = costly_here;
   });
   most_cap_ = most.empty() ? 0.0F : *std::max_element(most.begin(), most.end());
+  costly_.points = std::accumulate(costly.begin(), costly.end(), std::size_t{0});
+  apart_ = finite_ <= kLarge && static_cast<double>(costly_.points) < kMostCostly * static_cast<double>(finite_);
+  if (apart_) keep_costly();
+}
+
+void PointStore::keep_costly() {
+  costly_.blocks = (costly_.points + kBlockPoints - 1) / kBlockPoints;
+  const auto width = static_cast<std::size_t>(dimension_);
+  const std::size_t padded = costly_.blocks * kBlockPoints;
+  // One more place: what is written there next is not kept if it costs nothing.
+  costly_.caps.resize(padded + 1);
+  for (std::size_t c = 0; c < width; ++c) costly_.columns[c].resize(padded + 1);
+  std::size_t at = 0;
+  const float* const caps = all_.caps.data();
+  for (std::size_t i = 0; i < finite_; ++i) {
+    costly_.caps[at] = caps[i];
+    for (std::size_t c = 0; c < width; ++c) costly_.columns[c][at] = all_.columns[c][i];
+    at += caps[i] > 0 ? 1 : 0;
+  }
+  std::fill(costly_.caps.begin() + static_cast<std::ptrdiff_t>(at), costly_.caps.end(), 0.0F);
+  for (std::size_t c = 0; c < width; ++c) {
+    std::fill(costly_.columns[c].begin() + static_cast<std::ptrdiff_t>(at), costly_.columns[c].end(), 0.0F);
+  }
 }
 
 Summing PointStore::summing(Loss loss) const noexcept {
@@ -181,9 +216,9 @@ Summing PointStore::summing(Loss loss) const noexcept {
 
 void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summing) {
   if (bounds_current_ && bounds_summing_.loss == summing.loss && bounds_summing_.scale == summing.scale) return;
-  bounds_.resize(tiles());
-  for_each_task(tiles(), [&](std::size_t index) {
-    const TileView view = tile(index);
+  bounds_.resize(costly_tiles());
+  for_each_task(costly_tiles(), [&](std::size_t index) {
+    const TileView view = costly_tile(index);
     TileBounds& bounds = bounds_[index];
     for (std::size_t block = 0; block < kTileBlocks; ++block) {
       BlockBounds one;
@@ -203,15 +238,15 @@ void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summin
 }
 
 void PointStore::take_sides(const CpuKernels& kernels, ModelKind kind, const float* coefficients) {
-  for_each_task(tiles(), [&](std::size_t index) { kernels.take_sides(kind, tile(index), coefficients, bounds_[index]); });
+  for_each_task(costly_tiles(), [&](std::size_t index) { kernels.take_sides(kind, costly_tile(index), coefficients, bounds_[index]); });
 }
 
-TileView PointStore::tile(std::size_t index) const noexcept {
+TileView Columns::tile(int dimension, std::size_t index) const noexcept {
   TileView view;
   const std::size_t first = index * kTilePoints;
-  for (std::size_t c = 0; c < static_cast<std::size_t>(dimension_); ++c) view.columns[c] = columns_[c].data() + first;
-  view.caps = caps_.data() + first;
-  view.blocks = std::min(kTileBlocks, blocks_ - index * kTileBlocks);
+  for (std::size_t c = 0; c < static_cast<std::size_t>(dimension); ++c) view.columns[c] = columns[c].data() + first;
+  view.caps = caps.data() + first;
+  view.blocks = std::min(kTileBlocks, blocks - index * kTileBlocks);
   return view;
 }
 

@@ -31,6 +31,16 @@ struct LineAllocator {
 template <class T>
 using Aligned = std::vector<T, LineAllocator<T>>;
 
+/// Coordinates and caps in blocks, the last filled up with points that cost nothing.
+struct Columns {
+  std::array<Aligned<float>, kMaxDimension> columns;
+  Aligned<float> caps;
+  std::size_t points = 0, blocks = 0;
+
+  std::size_t tiles() const noexcept { return (blocks + kTileBlocks - 1) / kTileBlocks; }
+  TileView tile(int dimension, std::size_t index) const noexcept;
+};
+
 class PointStore {
  public:
   /// Runs inside the caller's crew, as all that follows. The points must be valid (check_points).
@@ -49,9 +59,13 @@ class PointStore {
   int dimension() const noexcept { return dimension_; }
   std::size_t count() const noexcept { return count_; }    ///< points given
   std::size_t finite() const noexcept { return finite_; }  ///< points kept
-  std::size_t tiles() const noexcept { return (blocks_ + kTileBlocks - 1) / kTileBlocks; }
-  TileView tile(std::size_t index) const noexcept;
-  const TileBounds& bounds(std::size_t tile) const noexcept { return bounds_[tile]; }
+  std::size_t tiles() const noexcept { return all_.tiles(); }
+  TileView tile(std::size_t index) const noexcept { return all_.tile(dimension_, index); }
+  /// Points that may cost something: without those whose cap is 0, where these are many.
+  std::size_t costly() const noexcept { return scored().points; }
+  std::size_t costly_tiles() const noexcept { return scored().tiles(); }
+  TileView costly_tile(std::size_t index) const noexcept { return scored().tile(dimension_, index); }
+  const TileBounds& bounds(std::size_t costly_tile) const noexcept { return bounds_[costly_tile]; }
   const double* centre() const noexcept { return centre_.data(); }
   /// Largest |coordinate| about the centre, a column.
   const std::array<float, kMaxDimension>& reach() const noexcept { return reach_; }
@@ -67,15 +81,16 @@ class PointStore {
 
   void keep_finite(const PointsView& points, std::vector<Chunk>& chunks);
   void sort();
+  void keep_costly();
+  const Columns& scored() const noexcept { return apart_ ? costly_ : all_; }
 
   int dimension_ = 0;
   std::size_t count_ = 0;
   std::size_t finite_ = 0;
-  std::size_t blocks_ = 0;
   std::array<double, kMaxDimension> centre_{};
   std::array<float, kMaxDimension> reach_{};
-  std::array<Aligned<float>, kMaxDimension> columns_;
-  Aligned<float> caps_;
+  Columns all_, costly_;
+  bool apart_ = false;  ///< whether the costly points are in `costly_`
   float most_cap_ = 0;
   std::vector<std::uint32_t> input_;  ///< empty where it would be the identity
   MortonOrder morton_;

@@ -19,7 +19,7 @@ constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 constexpr std::size_t kGroupsPerThread = 3, kLeastGroup = 8;
 
 struct Runs {
-  explicit Runs(const PointStore& store) : points(store.finite()), tiles(store.tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
+  explicit Runs(const PointStore& store) : points(store.costly()), tiles(store.costly_tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
     count = length == 0 ? 0 : (tiles + length - 1) / length;
   }
   std::size_t first(std::size_t run) const { return run * length; }
@@ -66,7 +66,7 @@ CentredSwarm part_of(const CentredSwarm& swarm, std::size_t first, std::size_t m
 constexpr std::size_t kTilesForSides = 16;
 /// Tiles after which models that have lost are looked for.
 constexpr std::size_t kStretch = 4;
-std::size_t stretches(const PointStore& points) { return (points.tiles() + kStretch - 1) / kStretch; }
+std::size_t stretches(const PointStore& points) { return (points.costly_tiles() + kStretch - 1) / kStretch; }
 
 /// Largest float that is not above `value`, and one less: sums in float and in double may differ in their last place.
 float below(double value) { return std::nextafter(static_cast<float>(value), 0.0F); }
@@ -77,15 +77,15 @@ std::uint64_t SwarmCosts::evaluate(PointStore& points, const CentredSwarm& swarm
   const Summing summing = points.summing(loss);
   if (!prune_now(points, swarm, summing)) {
     evaluate_all(points, swarm, summing, costs);
-    return points.finite() * swarm.count;
+    return points.costly() * swarm.count;
   }
   const std::uint64_t touched = evaluate_open(points, swarm, summing, costs);
-  pause_.note(static_cast<double>(touched) / (static_cast<double>(points.finite()) * static_cast<double>(swarm.count)));
+  pause_.note(static_cast<double>(touched) / (static_cast<double>(points.costly()) * static_cast<double>(swarm.count)));
   return touched;
 }
 
 bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing) {
-  if (!pruning_ || !traits(swarm.kind).bounded || summing.scale == 0 || points.finite() * swarm.count < kLeastWork) return false;
+  if (!pruning_ || !traits(swarm.kind).bounded || summing.scale == 0 || points.costly() * swarm.count < kLeastWork) return false;
   return pause_.now();
 }
 
@@ -118,7 +118,7 @@ void SwarmCosts::sum_units(const PointStore& points, const CentredSwarm& swarm, 
     }
     std::size_t& held = own.tiles[first];
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.add_units(swarm.kind, summing, points.tile(tile), swarm.coefficients.data() + first * width, models, nullptr,
+      kernels_.add_units(swarm.kind, summing, points.costly_tile(tile), swarm.coefficients.data() + first * width, models, nullptr,
                          own.lanes.data() + first * kMaxLanes);
       if (++held < kernels_.lanes) continue;
       settle(own, first, models);
@@ -144,7 +144,7 @@ void SwarmCosts::sum_values(const PointStore& points, const CentredSwarm& swarm,
   for (std::size_t run = 0; run < runs.count; ++run) values_[run].assign(swarm.count, 0.0);
   const auto add = [&](std::size_t run, std::size_t first, std::size_t models, std::size_t) {
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.add_values(swarm.kind, loss, points.tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
+      kernels_.add_values(swarm.kind, loss, points.costly_tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
                           values_[run].data() + first);
     }
   };
@@ -169,18 +169,18 @@ std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& 
     const std::size_t first = g * size, models = std::min(size, swarm.count - first);
     touched_[g] = group.evaluate(kernels_, points, part_of(swarm, first, models), summing, costs.subspan(first, models));
   };
-  if (worth_sharing(points.finite(), swarm.count)) {
+  if (worth_sharing(points.costly(), swarm.count)) {
     for_each_task(groups, one);
   } else {
     for (std::size_t g = 0; g < groups; ++g) one(g);
   }
   const auto best = static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
-  if (summing.loss == Loss::truncated_l1 && points.tiles() >= kTilesForSides && costs[best] < least_) {
+  if (summing.loss == Loss::truncated_l1 && points.costly_tiles() >= kTilesForSides && costs[best] < least_) {
     least_ = costs[best];
     points.take_sides(kernels_, swarm.kind, swarm.coefficients.data() + best * width_of(swarm.kind));
   }
   const std::uint64_t touched = std::accumulate(touched_.begin(), touched_.end(), std::uint64_t{0});
-  return std::min<std::uint64_t>(touched, points.finite() * swarm.count);  // padding was counted as well
+  return std::min<std::uint64_t>(touched, points.costly() * swarm.count);  // padding was counted as well
 }
 
 std::uint64_t OpenGroup::evaluate(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
@@ -222,8 +222,8 @@ void OpenGroup::bound(const CpuKernels& kernels, const PointStore& points, const
   slack_.resize(models);
   for (std::size_t j = 0; j < models; ++j) slack_[j] = residual_rounding(swarm.kind, coefficients + j * width, points.reach().data());
   parts_.assign(stretches(points) * models, {});
-  open_.resize(points.tiles() * models);
-  for (std::size_t tile = 0; tile < points.tiles(); ++tile) {
+  open_.resize(points.costly_tiles() * models);
+  for (std::size_t tile = 0; tile < points.costly_tiles(); ++tile) {
     kernels.bound(swarm.kind, loss, points.bounds(tile), coefficients, slack_.data(), models, open_.data() + tile * models,
                   parts_.data() + tile / kStretch * models);
   }
@@ -257,7 +257,7 @@ void OpenGroup::add_stretch(const CpuKernels& kernels, const PointStore& points,
   units_.assign(alive_.size(), 0);
   std::size_t held = 0;  // tiles
   std::array<std::uint8_t, kGroupModels> bits{};
-  const std::size_t last = std::min(points.tiles(), (stretch + 1) * kStretch);
+  const std::size_t last = std::min(points.costly_tiles(), (stretch + 1) * kStretch);
   for (std::size_t tile = stretch * kStretch; tile < last; ++tile) {
     unsigned any = 0;
     for (std::size_t a = 0; a < alive_.size(); ++a) {
@@ -266,7 +266,7 @@ void OpenGroup::add_stretch(const CpuKernels& kernels, const PointStore& points,
       touched_ += static_cast<std::uint64_t>(std::popcount(bits[a])) * kBlockPoints;
     }
     if (any == 0) continue;
-    kernels.add_units(swarm.kind, summing, points.tile(tile), coefficients_.data(), alive_.size(), bits.data(), lanes_.data());
+    kernels.add_units(swarm.kind, summing, points.costly_tile(tile), coefficients_.data(), alive_.size(), bits.data(), lanes_.data());
     if (++held < kernels.lanes) continue;
     kernels.settle_units(lanes_.data(), alive_.size(), units_.data());
     held = 0;
