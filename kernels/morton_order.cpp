@@ -85,7 +85,7 @@ void MortonOrder::sort(std::span<const float* const> columns, std::size_t count,
   const auto key = [&](std::size_t i) {
     std::uint32_t whole = 0;
     for (std::size_t c = 0; c < dimensions; ++c) {
-      const float cell = std::clamp((columns[c][i] - low[c]) * scale, 0.0F, most);
+      const float cell = std::min(std::max(0.0F, (columns[c][i] - low[c]) * scale), most);  // NaN, of infinities, becomes 0
       whole |= spread[static_cast<std::size_t>(static_cast<std::int32_t>(cell))] << c;
     }
     return whole;

@@ -1,5 +1,6 @@
 // Pruning changes nothing: with it, a cost below its cutoff is the same bytes as without, and any other lies between cutoff and truth.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <iterator>
@@ -292,6 +293,21 @@ TEST(MortonOrder, IsAPermutationOfNeighbours) {
     };
     EXPECT_LT(length(order), (dimensions == 2 ? 0.1 : 0.2) * length(all));
   }
+}
+
+TEST(MortonOrder, WhatIsBeyondFloatsIsSortedSomewhere) {
+  constexpr std::size_t kCount = 5000;
+  constexpr float kMost = std::numeric_limits<float>::max(), kInfinity = std::numeric_limits<float>::infinity();
+  std::array<std::vector<float>, 3> columns;
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    for (std::size_t i = 0; i < kCount; ++i) columns[c].push_back(std::array{kMost, -kMost, kInfinity, -kInfinity, 1.0F}[(i + c) % 5]);
+  }
+  const std::array<const float*, 3> starts{columns[0].data(), columns[1].data(), columns[2].data()};
+  std::vector<std::uint32_t> order, all(kCount);
+  MortonOrder().sort(starts, kCount, order);
+  std::sort(order.begin(), order.end());
+  std::iota(all.begin(), all.end(), 0U);
+  EXPECT_EQ(order, all);
 }
 
 TEST(MortonOrder, LargeCloudsAreOrderedAsSmallOnesAre) {

@@ -62,7 +62,10 @@ Expected<> fly(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& s
   const swarm::Sampler sampler(working, part.points.index(), part.neighbours, space, random);
   swarm::Landscape landscape(evaluator, space, working.frame(), settings);
   swarm::Swarm swarm(space, settings, random);
-  if (!swarm.start(sampler, 0, {})) return fail(Error::Kind::bad_input, "the points determine no model: all samples are degenerate");
+  if (!swarm.start(sampler, 0, {})) {
+    return fail(Error::Kind::bad_input,
+                fmt::format("the {} points determine no {}: all samples are degenerate", working.size(), space.title()));
+  }
   for (int step = 0; step < kSteps; ++step) {
     if (auto done = swarm.step(landscape, sampler, 1.0); !done) return done;
   }
@@ -88,6 +91,7 @@ Expected<> add_reference(Case& made) {
 
 Expected<Case> make_case(ModelType type, const PointsView& points, std::size_t particles, std::uint64_t seed, int threads) {
   models::WorkingPoints working(points);
+  if (const auto stray = working.stray()) return fail(Error::Kind::bad_input, models::text_of(*stray));
   const auto space = models::make_space(type, std::nullopt);
   if (working.finite_count() < static_cast<std::size_t>(space->minimal_sample())) {
     return fail(Error::Kind::bad_input, fmt::format("finite points is {}, must be >= {} to bench a {}", working.finite_count(),

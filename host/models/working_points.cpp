@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
 #include <Eigen/Dense>
 
 namespace swarmfit::models {
@@ -12,6 +13,20 @@ namespace swarmfit::models {
 kernels::PointsView to_kernel(const PointsView& points) noexcept {
   const auto scalar = points.scalar() == PointsView::Scalar::float32 ? kernels::Scalar::float32 : kernels::Scalar::float64;
   return {points.data(), scalar, points.dimension(), points.size(), points.stride()};
+}
+
+std::optional<Stray> find_stray(const kernels::PointsView& points) {
+  for (std::size_t i = 0; i < points.count; ++i) {
+    if (!points.finite(i)) continue;
+    for (int d = 0; d < points.dimension; ++d) {
+      if (std::abs(points.at(i, d)) > kFarthest) return Stray{i, d, points.at(i, d)};
+    }
+  }
+  return std::nullopt;
+}
+
+std::string text_of(const Stray& stray) {
+  return fmt::format("point {}, column {}: {:g}, must be in -{}..{}", stray.point + 1, stray.column + 1, stray.value, kFarthest, kFarthest);
 }
 
 namespace {
@@ -34,6 +49,7 @@ WorkingPoints::WorkingPoints(const PointsView& points, kernels::Survey survey) :
     if (d < view_.dimension) frame_.centre[row] = survey_.moments.mean[row];
     for (int e = 0; e < kMaxDimension; ++e) scatter(d, e) = survey_.moments.scatter[row][static_cast<std::size_t>(e)];
   }
+  reach_ = Eigen::Map<const Eigen::Vector4d>(frame_.centre.data()).norm() + std::sqrt(scatter.trace());
   scatter /= static_cast<double>(survey_.finite_count);
   const double variance = scatter.trace();
   frame_.scale = variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : 1.0;

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -26,6 +28,19 @@ struct Frame {
 };
 
 kernels::PointsView to_kernel(const PointsView& points) noexcept;
+
+/// Coordinates lie within this of 0: what the kernels square is a float.
+inline constexpr double kFarthest = 1e18;
+/// A coordinate that does not.
+struct Stray {
+  std::size_t point = 0;  ///< input index
+  int column = 0;
+  double value = 0;
+};
+/// The first one of a finite point, if there is one.
+std::optional<Stray> find_stray(const kernels::PointsView& points);
+/// Says which coordinate it is, what it is and what it must be.
+std::string text_of(const Stray& stray);
 
 /// Tells where finite points are in the input, in ascending order.
 class FiniteWalk {
@@ -59,6 +74,8 @@ class WorkingPoints {
   const Frame& frame() const noexcept { return frame_; }
   /// Dimension of the smallest flat that holds all finite points (to float precision): 0 a point, 1 a line, 2 a plane ...
   int rank() const noexcept { return rank_; }
+  /// The first coordinate beyond kFarthest, if there is one; the frame means nothing then.
+  std::optional<Stray> stray() const { return reach_ <= kFarthest / 8 ? std::nullopt : find_stray(view_); }
   /// Tells which rows are finite, out of this cloud's own memory.
   kernels::PointsView view() const noexcept {
     kernels::PointsView view = view_;
@@ -118,6 +135,7 @@ class WorkingPoints {
   kernels::PointsView view_;
   kernels::Survey survey_;
   Frame frame_;
+  double reach_ = 0;  ///< about what the farthest coordinate is; a survey holds what it sums within kFarthest of a point nearby
   int rank_ = 0;
   std::vector<Eigen::Vector3f> normals_;
 };

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "host/common/parallel.hpp"
+#include "host/models/working_points.hpp"
 
 namespace swarmfit::perception {
 namespace {
@@ -50,18 +51,24 @@ void copy_points(const std::vector<Scalar>& values, int threads, PointGrid& grid
     break;
   }
   std::atomic<std::size_t> finite = 0;
+  std::atomic<bool> stray = false;
   common::in_parallel(static_cast<int>(count), kPointsAtOnce, threads, [&](int first, int last) {
     std::size_t here = 0;
+    double farthest = 0;
     for (auto i = static_cast<std::size_t>(first); i < static_cast<std::size_t>(last); ++i) {
       const Scalar* x = &values[3 * i];
       const bool good = is_finite(x);
       here += good ? 1 : 0;
-      for (int k = 0; k < 3; ++k)
+      for (int k = 0; k < 3; ++k) {
+        if (good) farthest = std::max(farthest, std::abs(static_cast<double>(x[k])));
         grid.points[i][k] = good ? static_cast<float>(static_cast<double>(x[k]) - grid.origin[k]) : std::numeric_limits<float>::quiet_NaN();
+      }
     }
     finite += here;
+    if (farthest > models::kFarthest) stray = true;
   });
   grid.finite = finite;
+  grid.stray = stray;
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ struct PointGrid {
   std::vector<Eigen::Vector3f> points;               ///< relative to `origin`; NaN where the sensor saw nothing
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< not zero only where the coordinates are too large for single precision
   std::size_t finite = 0;
+  bool stray = false;  ///< a finite point is farther than numbers can be worked with, models::kFarthest
   float pitch = 0;  ///< angle between neighbouring pixels [rad]; unorganised: 0
 
   bool organised() const noexcept { return height > 1; }

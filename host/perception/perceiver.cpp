@@ -8,6 +8,7 @@
 
 #include <swarmfit/perception.hpp>
 
+#include "host/models/working_points.hpp"
 #include "host/perception/grid.hpp"
 #include "host/perception/objects.hpp"
 #include "host/perception/overview.hpp"
@@ -224,6 +225,11 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   const auto grid = perception::make_grid(frame, state_->options.fit.threads);
   if (grid.finite < 3)
     return fail(Error::Kind::bad_input, fmt::format("finite points is {} of {}, must be >= 3 to perceive", grid.finite, frame.size()));
+  if (grid.stray) {
+    if (const auto stray = models::find_stray(models::to_kernel(frame.points()))) {
+      return fail(Error::Kind::bad_input, models::text_of(*stray));
+    }
+  }
   const auto overview = perception::make_overview(grid, frame, state_->options.fit.threads);
   if (auto ok = state_->find_vertical(frame, grid, overview, stop, result); !ok) return tl::unexpected(ok.error());
   result.vertical_source = state_->vertical ? state_->vertical->source : "dominant plane";

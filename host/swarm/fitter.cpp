@@ -63,6 +63,7 @@ Expected<> check_points(const PointsView& points, const models::WorkingPoints& w
 
 /// Enough if one of the kinds can be fitted; else what the first lacks.
 Expected<> check_points(const PointsView& points, const models::WorkingPoints& working, std::span<const swarm::Kind> kinds) {
+  if (const auto stray = working.stray()) return fail(Error::Kind::bad_input, models::text_of(*stray));
   const auto first = check_points(points, working, *kinds.front().space);
   const bool any = std::any_of(kinds.begin(), kinds.end(), [&](const swarm::Kind& kind) {
     return !kind.hidden && check_points(points, working, *kind.space).has_value();

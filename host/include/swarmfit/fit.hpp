@@ -106,7 +106,7 @@ class SWARMFIT_API Fitter {
   Fitter& operator=(Fitter&&) noexcept;
 
   /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension,
-  /// an own model's function that threw).
+  /// a coordinate beyond 1e18, an own model's function that threw).
   Expected<FitResult> fit(const PointsView& points, const ModelCallback& on_model = {}, std::stop_token stop = {},
                           const std::vector<Model>& warm_start = {});
 

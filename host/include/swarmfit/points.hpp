@@ -9,7 +9,7 @@
 namespace swarmfit {
 
 /// N points of D columns, float or double, any stride in bytes. A point with NaN or infinity in a column keeps its place in the
-/// input's order, takes part in nothing and gets label 0.
+/// input's order, takes part in nothing and gets label 0. Other coordinates must be in -1e18..1e18.
 class PointsView {
  public:
   enum class Scalar { float32, float64 };
