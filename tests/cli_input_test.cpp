@@ -1,6 +1,8 @@
 // Input that cannot be used: one line, exit code 3, no file left behind.
 #include <string>
 
+#include <sys/stat.h>
+
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
@@ -8,8 +10,10 @@
 
 namespace {
 
+using swarmfit::tests::contents;
 using swarmfit::tests::expect_refusal;
 using swarmfit::tests::raw;
+using swarmfit::tests::run_shell;
 using swarmfit::tests::run_swarmfit;
 using swarmfit::tests::TemporaryFolder;
 
@@ -68,6 +72,35 @@ TEST(CliInput, CloudsThatHoldNoModel) {
   expect_refusal(folder, {"fit", "line2d", "two.xyz", "--json", "r.json"}, 3, "");
 }
 
+TEST(CliInput, CoordinatesBeyondNumbers) {
+  const TemporaryFolder folder;
+  // Enough points that they are sorted, and enough for every kind.
+  for (const char* far : {"1e200", "-3e38", "1.1e18"}) {
+    std::string points;
+    for (int i = 0; i < 900; ++i) points += std::to_string(i % 30) + "," + (i % 7 == 2 ? far : std::to_string(i / 30)) + ",0\n";
+    folder.put("far.csv", points);
+    const std::string what = "point 3, column 2: ", bound = ", must be in -1e+18..1e+18";
+    for (const char* kind : {"plane", "sphere", "plane,sphere,cylinder"}) {
+      expect_refusal(folder, {"fit", kind, "far.csv"}, 3, what);
+      expect_refusal(folder, {"fit", kind, "far.csv"}, 3, bound);
+    }
+    expect_refusal(folder, {"perceive", "far.csv"}, 3, what);
+    expect_refusal(folder, {"perceive", "far.csv", "--gravity", "0,0,-1"}, 3, bound);
+    expect_refusal(folder, {"bench", "--points", "far.csv", "--model", "plane", "--backend", "cpu"}, 3, what);
+  }
+}
+
+TEST(CliInput, AGalleryOfWhatIsNoFile) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n");
+  std::filesystem::create_directory(folder / "things");
+  ASSERT_EQ(::mkfifo((folder / "things/mug.png").c_str(), 0600), 0);
+  expect_refusal(folder, {"perceive", "c.xyz", "--gallery", "things"}, 3, "regular");
+  std::filesystem::remove(folder / "things/mug.png");
+  folder.put("things/mug.png", "");
+  expect_refusal(folder, {"perceive", "c.xyz", "--gallery", "things"}, 3, "mug.png: is empty");
+}
+
 TEST(CliInput, ImagesThatDoNotGoTogether) {
   const TemporaryFolder folder;
   cv::imwrite((folder / "c.png").string(), cv::Mat(30, 40, CV_8UC3, cv::Scalar::all(9)));
@@ -92,6 +125,44 @@ TEST(CliInput, OutputThatCannotBeWritten) {
   expect_refusal(folder, {"perceive", "c.xyz", "--out", "blocker"}, 3, "blocker");
   expect_refusal(folder, {"demo", "--out", "blocker"}, 3, "blocker");
   expect_refusal(folder, {"bench", "--json", "none/b.json"}, 3, "none/b.json");
+}
+
+TEST(CliInput, WhatIsPrintedGetsOutOrIsMissed) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full on this system";
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n");
+  for (const char* call : {"--version", "--help", "fit plane c.xyz", "fit plane c.xyz --quiet --json /dev/stdout", "perceive c.xyz c.xyz",
+                           "devices", "doctor", "man", "completion bash"}) {
+    const auto outcome = run_shell(folder, "\"$0\" " + std::string(call) + " > /dev/full");
+    EXPECT_EQ(outcome.code, 3) << call;
+    EXPECT_NE(outcome.err.find(": cannot be written: No space left on device\n"), std::string::npos) << call << "\n" << outcome.err;
+  }
+  EXPECT_EQ(run_shell(folder, "\"$0\" fit plane c.xyz --quiet > /dev/full").code, 0);
+  // Where nobody can be told, the exit code still says it.
+  EXPECT_EQ(run_shell(folder, "\"$0\" fit plane none.xyz 2> /dev/full").code, 3);
+  EXPECT_EQ(run_shell(folder, "\"$0\" fit plane c.xyz --verbose --quiet 2> /dev/full").code, 0);
+  EXPECT_EQ(run_shell(folder, "\"$0\" perceive c.xyz c.xyz 2> /dev/full").code, 0);
+}
+
+TEST(CliInput, NoFileTakesThePlaceOfAStreamThatIsClosed) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n");
+  const std::string fit = "\"$0\" fit plane c.xyz --backend cpu --verbose --labels ";
+  EXPECT_EQ(run_shell(folder, fit + "none.txt --quiet 2> .told").code, 0);
+  EXPECT_EQ(run_shell(folder, fit + "out.txt >&- 2> .told").code, 3);
+  EXPECT_EQ(run_shell(folder, fit + "all.txt <&- >&- 2>&-").code, 3);
+  EXPECT_EQ(contents(folder / "out.txt"), contents(folder / "none.txt"));
+  EXPECT_EQ(contents(folder / "all.txt"), contents(folder / "none.txt"));
+}
+
+TEST(CliInput, APipeIsOpenedOnce) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n");
+  // Who reads it is done when whoever writes closes it.
+  const auto outcome =
+      run_shell(folder, "mkfifo pipe && { cat pipe > copy.txt & timeout 60 \"$0\" fit plane c.xyz --quiet --labels pipe && wait; }");
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(contents(folder / "copy.txt"), "0\n0\n0\n0\n0\n");
 }
 
 TEST(CliInput, ABackEndThatIsNotThere) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -26,9 +27,9 @@ struct Outcome {
   std::string out, err;
 };
 
-/// One run of the program in a folder of its own; `interrupt_after` sends it a Ctrl-C.
-inline Outcome run_swarmfit(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
-                            std::chrono::milliseconds interrupt_after = std::chrono::milliseconds::zero()) {
+/// One run of a program, words[0], in a folder of its own; `interrupt_after` sends it a Ctrl-C.
+inline Outcome run_program(const TemporaryFolder& folder, std::vector<std::string> words,
+                           std::chrono::milliseconds interrupt_after = std::chrono::milliseconds::zero()) {
   const std::string out = folder / ".stdout", err = folder / ".stderr";
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -36,13 +37,11 @@ inline Outcome run_swarmfit(const TemporaryFolder& folder, const std::vector<std
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
   posix_spawn_file_actions_addchdir_np(&actions, folder.path().c_str());
-  std::vector<std::string> words = {SWARMFIT_COMMAND};
-  words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (auto& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   pid_t child = 0;
-  const int failed = posix_spawn(&child, SWARMFIT_COMMAND, &actions, nullptr, argv.data(), environ);
+  const int failed = posix_spawn(&child, words.front().c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   Outcome outcome;
   if (failed != 0) return outcome;
@@ -58,6 +57,18 @@ inline Outcome run_swarmfit(const TemporaryFolder& folder, const std::vector<std
   std::filesystem::remove(out);
   std::filesystem::remove(err);
   return outcome;
+}
+
+inline Outcome run_swarmfit(const TemporaryFolder& folder, const std::vector<std::string>& arguments,
+                            std::chrono::milliseconds interrupt_after = std::chrono::milliseconds::zero()) {
+  std::vector<std::string> words = {SWARMFIT_COMMAND};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  return run_program(folder, std::move(words), interrupt_after);
+}
+
+/// A line of shell, in which "$0" is the program.
+inline Outcome run_shell(const TemporaryFolder& folder, const std::string& line) {
+  return run_program(folder, {"/bin/sh", "-c", line, SWARMFIT_COMMAND});
 }
 
 /// The code, one line on stderr that starts with "swarmfit: " and holds `what`, nothing on stdout.

@@ -94,6 +94,29 @@ TEST(CliUsage, ValuesOutOfTheirBounds) {
   }
 }
 
+TEST(CliUsage, WhereAnOptionIsGivenSoIsItsValue) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n");
+  for (const char* option : {"--threshold", "--backend", "--threads", "--seed", "--particles", "--max-models", "--json", "--labels",
+                             "--out", "--report", "--gravity", "--normal", "--intrinsics"}) {
+    expect_refusal(folder, {"fit", "plane", "c.xyz", option, ""}, 2, std::string(option) + ": empty, must be ");
+    expect_refusal(folder, {"fit", "plane", "c.xyz", std::string(option) + "="}, 2, option);
+  }
+  expect_refusal(folder, {"fit", "", "c.xyz"}, 2, "model: empty, must be MODEL");
+  expect_refusal(folder, {"perceive", "c.xyz", "--gallery", ""}, 2, "--gallery: empty, must be DIR");
+  expect_refusal(folder, {"perceive", "c.xyz", ""}, 2, "input: empty, must be INPUT");
+  expect_refusal(folder, {"bench", "--json", ""}, 2, "--json: empty, must be FILE");
+  expect_refusal(folder, {"demo", "--frames", ""}, 2, "--frames: empty, must be N");
+}
+
+TEST(CliUsage, ABenchTakesWholeNumbersAndNames) {
+  const TemporaryFolder folder;
+  expect_refusal(folder, {"bench", "--seed", "1.5"}, 2, "--seed: 1.5, must be a whole number");
+  expect_refusal(folder, {"bench", "--threads", "1.5"}, 2, "--threads: 1.5, must be a whole number");
+  expect_refusal(folder, {"bench", "--model", ","}, 2, "--model: ,, must be");
+  expect_refusal(folder, {"bench", "--backend", ","}, 2, "--backend: ,, must be");
+}
+
 TEST(CliUsage, PerceiveTakesOneKindOfInput) {
   const TemporaryFolder folder;
   expect_refusal(folder, {"perceive"}, 2, "one of");
@@ -108,6 +131,8 @@ TEST(CliUsage, PerceiveTakesOneKindOfInput) {
   expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "91"}, 2, "--camera-tilt");
   expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "nan"}, 2, "--camera-tilt");
   expect_refusal(folder, {"perceive", "c.pcd", "--camera-tilt", "1", "--gravity", "0,1,0"}, 2, "exclude");
+  for (const char* value : {"0", "-1", "nan", "inf", "1e-30", "1e30"})
+    expect_refusal(folder, {"perceive", "c.pcd", "d.pcd", "--fps", value}, 2, "--fps: ");
 }
 
 }  // namespace

@@ -73,6 +73,10 @@ Expected<BenchPlan> plan(const BenchArguments& arguments) {
     options.particles = std::move(*particles);
   }
   options.backends = split(arguments.backend);
+  if (options.backends.empty() && !arguments.backend.empty())
+    return invalid(fmt::format("--backend: {}, must be NAME,NAME", arguments.backend));
+  if (split(arguments.model).empty() && !arguments.model.empty())
+    return invalid(fmt::format("--model: {}, must be MODEL,MODEL", arguments.model));
   for (const auto& name : split(arguments.model)) {
     const auto type = model_type(name);
     if (!type) return tl::unexpected(type.error());
@@ -87,16 +91,18 @@ Expected<BenchPlan> plan(const BenchArguments& arguments) {
   } else {
     return invalid(fmt::format("--pruning: {}, must be off, on or both", arguments.pruning));
   }
-  const auto threads = parse_number(arguments.threads), seconds = parse_number(arguments.seconds), seed = parse_number(arguments.seed);
-  if (!threads || !(*threads >= 0 && *threads <= 4096) || *threads != static_cast<int>(*threads)) {
-    return invalid(fmt::format("--threads: {}, must be a whole number in 0..4096", arguments.threads));
-  }
+  const auto seconds = parse_number(arguments.seconds);
   if (!seconds || !(*seconds > 0 && *seconds <= 3600))
     return invalid(fmt::format("--seconds: {}, must be in (0, 3600]", arguments.seconds));
-  if (!seed || !(*seed >= 0 && *seed < 1.8e19)) return invalid(fmt::format("--seed: {}, must be a whole number >= 0", arguments.seed));
-  options.threads = static_cast<int>(*threads);
   options.seconds = *seconds;
-  options.seed = static_cast<std::uint64_t>(*seed);
+  // As fits take them.
+  FitFlags flags;
+  flags.threads = arguments.threads;
+  flags.seed = arguments.seed;
+  FitOptions fit;
+  if (auto ok = flags.apply(fit); !ok) return tl::unexpected(ok.error());
+  options.threads = fit.threads;
+  options.seed = fit.seed;
   return plan;
 }
 

@@ -32,7 +32,7 @@ const std::string kRed = "\033[1;31m", kGreen = "\033[32m", kYellow = "\033[33m"
 /// A note that a person should not overlook.
 void alarm(std::string_view message) {
   const bool colours = wants_colours(STDERR_FILENO);
-  fmt::print(stderr, "{}swarmfit:{} {}\n", colours ? kRed.c_str() : "", colours ? kPlain.c_str() : "", on_one_line(message));
+  tell(fmt::format("{}swarmfit:{} {}\n", colours ? kRed.c_str() : "", colours ? kPlain.c_str() : "", on_one_line(message)));
 }
 
 /// A stop source may not be touched in a signal handler, a pipe may: a thread waits at its other end.
@@ -61,7 +61,12 @@ int exit_code(Error::Kind kind) noexcept {
   return kBadInput;
 }
 
-void note(std::string_view message) { fmt::print(stderr, "swarmfit: {}\n", on_one_line(message)); }
+void tell(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+  std::fflush(stderr);
+}
+
+void note(std::string_view message) { tell(fmt::format("swarmfit: {}\n", on_one_line(message))); }
 
 int complain(const Error& error) {
   alarm(error.message);
@@ -117,7 +122,9 @@ void Progress::step(std::string what, std::size_t done, std::size_t whole) {
 
 void Progress::within(double ms) {
   const std::scoped_lock lock(mutex_);
-  if (ms > 0) deadline_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::milli>(ms));
+  constexpr double kYear = 3.2e10;  // [ms]; a clock holds no more than a few hundred of them
+  if (ms > 0 && ms < kYear)
+    deadline_ = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double, std::milli>(ms));
 }
 
 std::string Progress::line() const {
@@ -146,11 +153,10 @@ void Progress::run(const std::stop_token& stop) {
   bool shown = false;
   for (auto wait = 1000ms; !wake.wait_for(lock, stop, wait, [&] { return stop.stop_requested(); }); wait = 200ms) {
     const std::scoped_lock reading(mutex_);
-    fmt::print(stderr, "\r\033[K{}", line());
-    std::fflush(stderr);
+    tell("\r\033[K" + line());
     shown = true;
   }
-  if (shown) fmt::print(stderr, "\r\033[K");
+  if (shown) tell("\r\033[K");
 }
 
 Interrupt::Interrupt() {

@@ -25,6 +25,9 @@ int exit_code(Error::Kind kind) noexcept;
 int complain(const Error& error);
 int wrong_usage(std::string_view message);
 
+/// Text on stderr as it is. Where that is full or closed there is nobody to tell, and nothing is thrown.
+void tell(std::string_view text);
+
 /// "swarmfit: message" on stderr, nothing to worry about.
 void note(std::string_view message);
 

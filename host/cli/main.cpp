@@ -1,7 +1,11 @@
 // The command `swarmfit`: parses, dispatches, and turns whatever goes wrong into one line and an exit code.
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <exception>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
@@ -37,6 +41,16 @@ std::string command_names(const CLI::App& app) {
   return fmt::format("{}", fmt::join(names, ", "));
 }
 
+/// An option whose value is empty, as where a shell's variable is not set: what was meant is not known.
+const CLI::Option* empty_option(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    const auto& values = option->results();
+    const bool takes_value = option->get_items_expected_min() > 0 || option->get_positional();
+    if (takes_value && std::find(values.begin(), values.end(), std::string()) != values.end()) return option;
+  }
+  return nullptr;
+}
+
 /// What CLI11 has to say, in our form.
 std::string usage_error(const CLI::App& app, const CLI::ParseError& error, int argc, const char* const* argv) {
   const auto subcommands = app.get_subcommands();
@@ -66,9 +80,20 @@ int run(int argc, const char* const* argv) {
     return wrong_usage(usage_error(app, error, argc, argv));
   }
   for (const Command& command : commands) {
-    if (command.app->parsed()) return command.run();
+    if (!command.app->parsed()) continue;
+    if (const CLI::Option* empty = empty_option(*command.app)) {
+      return wrong_usage(fmt::format("{}: empty, must be {}", empty->get_name(), empty->get_type_name()));
+    }
+    return command.run();
   }
   return kWrongUsage;
+}
+
+/// What was printed has to get out.
+int finish(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  const std::string why = errno != 0 ? ": " + std::generic_category().message(errno) : "";
+  return complain({Error::Kind::cannot_write, "stdout: cannot be written" + why});
 }
 
 }  // namespace
@@ -78,10 +103,11 @@ int main(int argc, char** argv) {
   swarmfit::cli::settle_process();
   try {
     swarmfit::cli::remember_command(argc, argv);
-    return swarmfit::cli::run(argc, argv);
+    return swarmfit::cli::finish(swarmfit::cli::run(argc, argv));
   } catch (const std::bad_alloc&) {
     return swarmfit::cli::complain({swarmfit::Error::Kind::out_of_memory, "out of memory"});
   } catch (const std::exception& e) {
+    if (std::ferror(stdout) != 0) return swarmfit::cli::finish(0);
     return swarmfit::cli::complain({swarmfit::Error::Kind::bad_input, e.what()});
   }
 }

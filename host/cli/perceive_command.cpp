@@ -96,7 +96,7 @@ Expected<FrameSource> source(const PerceiveArguments& a) {
     return play(std::move(frames));
   }
   const auto fps = parse_number(a.fps);
-  if (!fps || !(*fps > 0) || !std::isfinite(*fps)) return invalid(fmt::format("--fps: {}, must be a number > 0", a.fps));
+  if (!fps || !(*fps >= 1e-3 && *fps <= 1e6)) return invalid(fmt::format("--fps: {}, must be in 0.001..1000000 [1/s]", a.fps));
   return play_at(std::move(frames), *fps, a.drop.value_or(true));
 }
 

@@ -5,6 +5,8 @@
 #include <memory>
 
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <unistd.h>
 #if defined(__GLIBC__)
 #include <malloc.h>
 #include <sys/mman.h>
@@ -28,9 +30,18 @@ void ask_for_large_pages() {
 #endif
 }
 
+/// With a standard stream closed, the next file that is opened would take its place: summaries would go into a result. What stands here
+/// instead cannot be written to.
+void hold_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(stream, F_GETFD) == -1 && ::open("/dev/null", O_RDONLY) == -1) return;
+  }
+}
+
 }  // namespace
 
 void settle_process() {
+  hold_standard_streams();
 #if defined(__GLIBC__)
   constexpr int kLarge = 1 << 30;  // [bytes]
   mallopt(M_MMAP_THRESHOLD, kLarge);

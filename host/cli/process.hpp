@@ -6,10 +6,10 @@
 
 namespace swarmfit::cli {
 
-/// Memory that was freed is kept for the next large array instead of going back to the system page by page, and comes in large pages where the
-/// system gives them on request; and OpenBLAS, which OpenCV brings
-/// along on some systems, lets go of its workers, which else spin on the processors for the first tens of milliseconds. It starts them again if
-/// it needs them. Where either is not there nothing happens.
+/// No file takes the place of a standard stream that is closed. Memory that was freed is kept for the next large array instead of going back
+/// to the system page by page, and comes in large pages where the system gives them on request. OpenBLAS, which OpenCV brings along on some
+/// systems, lets go of its workers, which else spin on the processors for the first tens of milliseconds; it starts them again if it needs
+/// them. Where any of this is not there nothing happens.
 void settle_process();
 
 /// Once an input is loaded. Where its points take so many bytes that memory counts for more than the faults of its pages, what reading them

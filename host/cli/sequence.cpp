@@ -1,10 +1,12 @@
 #include "host/cli/sequence.hpp"
 
+#include <cerrno>
 #include <condition_variable>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -80,13 +82,13 @@ class Lines {
     if (file.empty()) return lines;
     lines.name_ = file;
     lines.file_.reset(std::fopen(file.c_str(), "wb"));
-    if (!lines.file_) return fail(Error::Kind::cannot_write, file + ": cannot be written");
+    if (!lines.file_) return fail(Error::Kind::cannot_write, file + ": cannot be written: " + std::generic_category().message(errno));
     return lines;
   }
   Expected<> write(const std::string& line) {
     std::FILE* to = file_ ? file_.get() : stdout;
     if (std::fwrite(line.data(), 1, line.size(), to) == line.size() && std::fflush(to) == 0) return {};
-    return fail(Error::Kind::cannot_write, (file_ ? name_ : "stdout") + ": cannot be written");
+    return fail(Error::Kind::cannot_write, (file_ ? name_ : "stdout") + ": cannot be written: " + std::generic_category().message(errno));
   }
 
  private:
@@ -130,8 +132,8 @@ class Sequence {
       }
     }
     if (!job_.output.quiet) {
-      fmt::print(stderr, "{}", times_.report(whole.ms() / 1000));
-      if (job_.more) fmt::print(stderr, "{}", job_.more());
+      tell(times_.report(whole.ms() / 1000));
+      if (job_.more) tell(job_.more());
     }
     return code_;
   }

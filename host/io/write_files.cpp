@@ -108,6 +108,12 @@ Expected<> write_all(const fs::path& folder, const Files& files) {
 
 Expected<> check_writable(const fs::path& file) {
   return io::guarded(file, Error::Kind::cannot_write, [&]() -> Expected<> {
+    // A pipe's reader would take it for the end if it were opened and closed.
+    std::error_code none;
+    const fs::file_type type = fs::status(file, none).type();
+    if (type == fs::file_type::fifo || type == fs::file_type::character || type == fs::file_type::socket) {
+      return ::access(file.c_str(), W_OK) == 0 ? Expected<>() : cannot_write(file, std::generic_category().message(errno));
+    }
     auto pending = io::PendingFile::write(file, {});
     if (!pending) return tl::unexpected(std::move(pending.error()));
     return {};

@@ -4,13 +4,13 @@
 #include <array>
 #include <cctype>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "host/io/file.hpp"
 #include "host/io/image.hpp"
 
 namespace swarmfit::perception {
@@ -28,10 +28,10 @@ Expected<std::vector<fs::path>> entries(const fs::path& folder) {
   if (error)
     return fail(Error::Kind::bad_input, fmt::format("gallery {}: cannot be read as a folder: {}", folder.string(), error.message()));
   std::vector<fs::path> found;
-  for (; it != fs::directory_iterator(); it.increment(error)) {
-    if (error) return fail(Error::Kind::bad_input, fmt::format("gallery {}: {}", folder.string(), error.message()));
+  for (; it != fs::directory_iterator(); it.increment(error)) {  // to the end where there is an error
     if (it->path().filename().string().front() != '.') found.push_back(it->path());
   }
+  if (error) return fail(Error::Kind::bad_input, fmt::format("gallery {}: {}", folder.string(), error.message()));
   std::sort(found.begin(), found.end());
   return found;
 }
@@ -69,10 +69,9 @@ Expected<std::vector<GalleryPicture>> list_pictures(const fs::path& folder) {
 }
 
 Expected<std::string> read_picture(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (bytes.empty()) return fail(Error::Kind::bad_input, fmt::format("gallery image {}: cannot be read", file.string()));
-  return bytes;
+  const auto bytes = io::read_file(file);
+  if (!bytes) return fail(bytes.error().kind, "gallery image " + bytes.error().message);
+  return std::string(bytes->text());
 }
 
 Expected<Features> picture_features(const fs::path& file, std::string_view bytes) {
