@@ -2,8 +2,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <new>
 #include <sstream>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -37,6 +40,18 @@ TEST(Process, LargeArraysLieInLargePages) {
   const std::vector<char> large(std::size_t{16} << 20, 1);
   const std::string flags = flags_at(&large[large.size() / 2]);
   EXPECT_NE(flags.find(" hg "), std::string::npos) << flags;
+}
+
+TEST(Process, WhatIsThrownIsToldInWords) {
+  const Error memory = error_of(std::bad_alloc());
+  EXPECT_EQ(memory.kind, Error::Kind::out_of_memory);
+  EXPECT_EQ(memory.message, "out of memory");
+  const Error thread = error_of(std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again)));
+  EXPECT_EQ(thread.kind, Error::Kind::out_of_memory);
+  EXPECT_TRUE(thread.message.starts_with("a thread cannot be started: ")) << thread.message;
+  const Error other = error_of(std::runtime_error("a word"));
+  EXPECT_EQ(other.kind, Error::Kind::bad_input);
+  EXPECT_EQ(other.message, "a word");
 }
 
 }  // namespace

@@ -104,10 +104,8 @@ int main(int argc, char** argv) {
   try {
     swarmfit::cli::remember_command(argc, argv);
     return swarmfit::cli::finish(swarmfit::cli::run(argc, argv));
-  } catch (const std::bad_alloc&) {
-    return swarmfit::cli::complain({swarmfit::Error::Kind::out_of_memory, "out of memory"});
   } catch (const std::exception& e) {
     if (std::ferror(stdout) != 0) return swarmfit::cli::finish(0);
-    return swarmfit::cli::complain({swarmfit::Error::Kind::bad_input, e.what()});
+    return swarmfit::cli::complain(swarmfit::cli::error_of(e));
   }
 }

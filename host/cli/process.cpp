@@ -3,6 +3,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <new>
+#include <system_error>
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -51,6 +53,14 @@ void settle_process() {
   using Shutdown = int (*)();
   // POSIX: what dlsym gives for a function may be called as one.
   if (void* found = dlsym(RTLD_DEFAULT, "blas_thread_shutdown_")) reinterpret_cast<Shutdown>(found)();
+}
+
+Error error_of(const std::exception& thrown) {
+  if (dynamic_cast<const std::bad_alloc*>(&thrown) != nullptr) return {Error::Kind::out_of_memory, "out of memory"};
+  const auto* system = dynamic_cast<const std::system_error*>(&thrown);
+  if (system != nullptr && system->code() == std::errc::resource_unavailable_try_again)
+    return {Error::Kind::out_of_memory, "a thread cannot be started: " + system->code().message()};
+  return {Error::Kind::bad_input, thrown.what()};
 }
 
 void settle_large_input(std::size_t bytes) {

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <string>
+
+#include <swarmfit/error.hpp>
 
 namespace swarmfit::cli {
 
@@ -16,6 +19,9 @@ void settle_process();
 /// took goes back to the system, and so do arrays of that size from now on when they are freed: on the heap, what is left between them would
 /// not fit the next.
 void settle_large_input(std::size_t bytes);
+
+/// What an exception that nobody else caught says to whoever runs the command.
+Error error_of(const std::exception& thrown);
 
 /// The command line, for what is written to say how to have it again.
 void remember_command(int argc, const char* const* argv);
