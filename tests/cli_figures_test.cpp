@@ -54,7 +54,7 @@ TEST(CliFigures, RefusedBeforeAnyWork) {
   expect_refusal(folder, {"figures", "--out", "f", "more"}, 2, "more");
   expect_refusal(folder, {"figures", "--out", "f", "--frame", "none.pcd"}, 3, "none.pcd");
   expect_refusal(folder, {"figures", "--out", "f", "--frame", "c.xyz"}, 3, "no image grid");
-  expect_refusal(folder, {"figures", "--out", ""}, 3, "empty");
+  expect_refusal(folder, {"figures", "--out", ""}, 2, "empty");
   expect_refusal(folder, {"figures", "--out", "file"}, 3, "not a folder");
   expect_refusal(folder, {"figures", "--out", "file/below"}, 3, "not a folder");
   expect_refusal(folder, {"figures", "--out", "/proc/figures"}, 3, "/proc/figures");
