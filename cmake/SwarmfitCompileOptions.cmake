@@ -13,4 +13,8 @@ if(SWARMFIT_SANITIZE)
     # GCC 12 warns of std::regex under sanitizers, without cause.
     $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_link_options(swarmfit_compile_options INTERFACE -fsanitize=${SWARMFIT_SANITIZE})
+  if(SWARMFIT_SANITIZE MATCHES address)
+    target_sources(swarmfit_compile_options INTERFACE
+      $<$<STREQUAL:$<TARGET_PROPERTY:TYPE>,EXECUTABLE>:${PROJECT_SOURCE_DIR}/tests/keep_libraries.cpp>)
+  endif()
 endif()
