@@ -39,6 +39,13 @@ bool is_finite(const Scalar* x) {
   return std::isfinite(x[0]) && std::isfinite(x[1]) && std::isfinite(x[2]);
 }
 
+/// Finite, and as near as coordinates must be.
+template <class Scalar>
+bool is_near(const Scalar* x) {
+  constexpr auto kMost = static_cast<Scalar>(models::kFarthest);
+  return std::abs(x[0]) <= kMost && std::abs(x[1]) <= kMost && std::abs(x[2]) <= kMost;
+}
+
 template <class Scalar>
 void copy_points(const std::vector<Scalar>& values, int threads, PointGrid& grid) {
   const std::size_t count = values.size() / 3;
@@ -54,18 +61,17 @@ void copy_points(const std::vector<Scalar>& values, int threads, PointGrid& grid
   std::atomic<bool> stray = false;
   common::in_parallel(static_cast<int>(count), kPointsAtOnce, threads, [&](int first, int last) {
     std::size_t here = 0;
-    double farthest = 0;
+    bool beyond = false;
     for (auto i = static_cast<std::size_t>(first); i < static_cast<std::size_t>(last); ++i) {
       const Scalar* x = &values[3 * i];
-      const bool good = is_finite(x);
+      const bool near = is_near(x), good = near || is_finite(x);
+      beyond |= near != good;
       here += good ? 1 : 0;
-      for (int k = 0; k < 3; ++k) {
-        if (good) farthest = std::max(farthest, std::abs(static_cast<double>(x[k])));
+      for (int k = 0; k < 3; ++k)
         grid.points[i][k] = good ? static_cast<float>(static_cast<double>(x[k]) - grid.origin[k]) : std::numeric_limits<float>::quiet_NaN();
-      }
     }
     finite += here;
-    if (farthest > models::kFarthest) stray = true;
+    if (beyond) stray = true;
   });
   grid.finite = finite;
   grid.stray = stray;

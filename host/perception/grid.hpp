@@ -20,7 +20,7 @@ struct PointGrid {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< not zero only where the coordinates are too large for single precision
   std::size_t finite = 0;
   bool stray = false;  ///< a finite point is farther than numbers can be worked with, models::kFarthest
-  float pitch = 0;  ///< angle between neighbouring pixels [rad]; unorganised: 0
+  float pitch = 0;     ///< angle between neighbouring pixels [rad]; unorganised: 0
 
   bool organised() const noexcept { return height > 1; }
   std::size_t size() const noexcept { return points.size(); }
