@@ -205,13 +205,13 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   }
   models::WorkingPoints& working = thin_rows ? thin : *whole;
   const bool searches_part = settings.searches_part(working.finite_count());
-  const swarm::Part part =
-      swarm::look_closely(working, keenest(kinds), random, searches_part ? settings.search_points : swarm::kSampledFrom, &evaluator);
-  const std::size_t searched = searches_part ? part.points.index().size() : working.size();
-  if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
-
   const double depth = options.noise == Noise::none ? 0.0 : swarm::near_depth(working);
   const std::vector<float> spread = swarm::spread_of(options.noise, working, depth);
+  const swarm::Part part =
+      swarm::look_closely(working, keenest(kinds), random, searches_part ? settings.search_points : swarm::kSampledFrom, &evaluator,
+                          searches_part ? std::span<const float>(spread) : std::span<const float>());
+  const std::size_t searched = searches_part ? part.points.index().size() : working.size();
+  if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 
   FitResult result;
   swarm::Watch watch{state_->observer, 0};

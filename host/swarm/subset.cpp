@@ -125,6 +125,47 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
   return drawn;
 }
 
+namespace {
+
+/// `s` for which the sum of min(1, s / spread) over the finite points is `size`, which is less than their number.
+double share_of_steady(const models::WorkingPoints& points, std::span<const float> spread, std::size_t size) {
+  constexpr int kMostRounds = 20;  // each may find more points that are taken in any case, and seldom do five
+  double share = 0;
+  for (int round = 0; round < kMostRounds; ++round) {
+    double sure = 0, worth = 0;
+    for (std::size_t i = 0; i < spread.size(); ++i) {
+      if (!points.finite(i)) continue;
+      const auto each = static_cast<double>(spread[i]);
+      sure += share >= each ? 1 : 0;
+      worth += share >= each ? 0 : 1 / each;
+    }
+    const double next = worth > 0 ? (static_cast<double>(size) - sure) / worth : share;
+    if (!(next > share)) break;
+    share = next;
+  }
+  return share;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
+                                            std::size_t size, std::span<const float> spread) {
+  if (points.finite_count() <= size) return draw_part(points, random, number, size);
+  const double share = share_of_steady(points, spread, size);
+  std::vector<std::uint32_t> drawn;
+  drawn.reserve(size + 1);
+  // One at each whole number that the sum of shares passes: evenly over the input's order.
+  double sum = Random::unit(random.words(Draw::subset, number, 0, 0)[0]);
+  for (std::size_t i = 0; i < spread.size() && drawn.size() < size; ++i) {
+    if (!points.finite(i)) continue;
+    sum += std::min(1.0, share / static_cast<double>(spread[i]));
+    if (sum < 1) continue;
+    sum -= 1;
+    drawn.push_back(static_cast<std::uint32_t>(i));
+  }
+  return drawn;
+}
+
 Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> index, kernels::FitnessEvaluator* workers)
     : scalar_(points.scalar == kernels::Scalar::float32 ? PointsView::Scalar::float32 : PointsView::Scalar::float64),
       dimension_(points.dimension),
@@ -139,9 +180,8 @@ Rows::Rows(const kernels::PointsView& points, std::span<const std::uint32_t> ind
 
 PointsView Rows::view() const noexcept { return {bytes_.data(), scalar_, dimension_, bytes_.size() / width_, width_}; }
 
-Subset::Subset(const models::WorkingPoints& points, const Random& random, std::size_t size, kernels::FitnessEvaluator* workers)
-    : index_(in_morton_order(points, draw_part(points, random, kSearchedPart, size, workers), workers)),
-      rows_(points.view(), index_, workers) {}
+Subset::Subset(const models::WorkingPoints& points, std::span<const std::uint32_t> drawn, kernels::FitnessEvaluator* workers)
+    : index_(in_morton_order(points, drawn, workers)), rows_(points.view(), index_, workers) {}
 
 void Subset::gather(std::span<const float> all, std::vector<float>& values) const {
   values.resize(index_.size());
@@ -149,9 +189,11 @@ void Subset::gather(std::span<const float> all, std::vector<float>& values) cons
 }
 
 Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
-                  kernels::FitnessEvaluator* workers) {
+                  kernels::FitnessEvaluator* workers, std::span<const float> spread) {
   constexpr std::size_t kNeighbours = 16;
-  Part part{Subset(points, random, size, workers), {}};
+  const std::vector<std::uint32_t> drawn = spread.empty() ? draw_part(points, random, kSearchedPart, size, workers)
+                                                          : draw_steady_part(points, random, kSearchedPart, size, spread);
+  Part part{Subset(points, drawn, workers), {}};
   const bool correspondences = points.dimension() > 3;
   if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
   if (space.agrees_by_normals()) {

@@ -21,6 +21,11 @@ inline constexpr std::uint32_t kSearchedPart = 0, kThinnedPart = 1;
 std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
                                      kernels::FitnessEvaluator* workers = nullptr);
 
+/// The same of a cloud whose points are worth the less the more `spread`, one a point and >= 1, says their noise is: each is drawn with a
+/// probability that falls as 1 / spread, so that what a model saves on them is, on average, counted in units of each point's own noise.
+std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
+                                            std::size_t size, std::span<const float> spread);
+
 /// Rows of a cloud, copied as they are: a cloud of its own.
 class Rows {
  public:
@@ -39,7 +44,8 @@ class Rows {
 /// What a swarm searches on while it looks around: a part of the cloud in Morton order, in which neighbours are neighbours in space.
 class Subset {
  public:
-  Subset(const models::WorkingPoints& points, const Random& random, std::size_t size, kernels::FitnessEvaluator* workers = nullptr);
+  /// Of the points `drawn`.
+  Subset(const models::WorkingPoints& points, std::span<const std::uint32_t> drawn, kernels::FitnessEvaluator* workers = nullptr);
 
   /// Input indices, in Morton order.
   std::span<const std::uint32_t> index() const noexcept { return index_; }
@@ -64,8 +70,8 @@ struct Part {
 };
 
 /// A part of `size` points at most, with neighbourhoods where the kind has use for them. Gives `points` the normals of the part where
-/// the kind looks at them.
+/// the kind looks at them. `spread` is empty or as for draw_steady_part().
 Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
-                  kernels::FitnessEvaluator* workers = nullptr);
+                  kernels::FitnessEvaluator* workers = nullptr, std::span<const float> spread = {});
 
 }  // namespace swarmfit::swarm
