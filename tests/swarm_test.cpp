@@ -172,7 +172,7 @@ TEST_P(KnownLandscape, SwarmConvergesOnTheOptimum) {
   settings.topology = GetParam();
   settings.iterations = 400;
   const Random random(11);
-  const Subset subset(points, random, 1000);
+  const Subset subset(points, draw_part(points, random, kSearchedPart, 1000));
   const models::Neighbours none;
   const Sampler sampler(points, subset.index(), none, *space, random);
   Landscape landscape(bowl, *space, points.frame(), settings);
@@ -353,7 +353,7 @@ TEST(Subset, CoversEvenlyAndKeepsNeighboursTogether) {
   const std::vector<double> rows = slab(5000, 0.01);
   const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
   const Random random(1);
-  const Subset part(points, random, 500), whole(points, random, 10000);
+  const Subset part(points, draw_part(points, random, kSearchedPart, 500)), whole(points, draw_part(points, random, kSearchedPart, 10000));
   EXPECT_EQ(part.index().size(), 500U);
   EXPECT_EQ(whole.index().size(), 5000U);
   double along = 0, across = 0;

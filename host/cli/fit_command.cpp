@@ -200,8 +200,8 @@ Command add_fit(CLI::App& app) {
   sub->add_option("--within", arguments->within, "How near: within this angle [11.5]")->type_name("DEG")->group(FitFlags::kGroup);
   sub->add_option(
          "--noise", arguments->noise,
-         "depth: from the near end on, the threshold grows with the square of the depth z, as the noise of depth cameras and stereo "
-         "does; it is estimated where none is given")
+         "depth: beyond the near end (three tenths of the points) the threshold grows with the square of the depth z, as the noise of "
+         "depth cameras and stereo does; it is estimated where none is given")
       ->type_name("none|depth")
       ->group(FitFlags::kGroup)
       ->capture_default_str();

@@ -424,8 +424,9 @@ Expected<> MultiModel::sink(const Candidate& candidate, std::vector<float>& caps
   if (may_share()) near.nearest.resize(points_.size(), std::numeric_limits<float>::infinity());
   std::vector<float> room, reaches;
   const int reach = tail_reach(candidate.support);
-  if (lists_distances() && reach > 1 && space(candidate.kind).type() == ModelType::plane && allowed_.empty()) {
-    reaches = local_reach(points_, candidate.theta.head<3>(), candidate.distances, caps, tau_, reach);
+  if (lists_distances() && reach > 1 && space(candidate.kind).type() == ModelType::plane) {
+    std::vector<float> caps_room;
+    reaches = local_reach(points_, candidate.theta.head<3>(), levelled(candidate.distances, room), levelled(caps, caps_room), tau_, reach);
   }
   return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
     const std::span<const float> level = levelled(distances, room);

@@ -7,7 +7,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr int kDepth = 2;            // the column
-constexpr double kNear = 0.1;        // share of the points that are nearer than what tau is for; a few strays make no near end
+constexpr double kNear = 0.3;        // share of the points that are nearer than what tau is for; one near thing makes no near end
 constexpr double kMostSpread = 1e4;  // a hundred times as far as that: noise tells nothing there
 
 }  // namespace

@@ -14,16 +14,18 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kSigmas = 2.5;          // 98.8 % of a Gaussian lie within
-constexpr double kReach = 3;             // thresholds: how far about the models points tell the noise from what surrounds it
-constexpr double kGenerous = 0.08;       // first threshold, in units of the cloud's own spread
-constexpr double kLeast = 1e-6;          // no threshold below this, in the same units: float coordinates carry no more
-constexpr double kSettled = 0.05;        // relative change of the threshold below which it stays
-constexpr double kAlike = 0.25;          // one below which a search would find the same models
-constexpr int kFreeSteps = 2;            // of the threshold; further ones go half the way, for it may swing between two models' noise
-constexpr int kRounds = 10;              // of search
-constexpr int kSteps = 10;               // of models and threshold in turn, after each
-constexpr double kWidest = 0.25;         // of the cloud's width: a slab that has half the cloud within it tells no noise
+constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
+constexpr double kReach = 3;        // thresholds: how far about the models points tell the noise from what surrounds it
+constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
+constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
+constexpr double kSettled = 0.05;   // relative change of the threshold below which it stays
+constexpr double kAlike = 0.25;     // one below which a search would find the same models
+constexpr int kFreeSteps = 2;       // of the threshold; further ones go half the way, for it may swing between two models' noise
+constexpr int kRounds = 10;         // of search
+constexpr int kSteps = 10;          // of models and threshold in turn, after each
+constexpr double kWidest = 0.25;    // of the cloud's width: a slab that has half the cloud within it tells no noise
+constexpr double kWidened = 2;      // times what a search started with: it went the wrong way, or started far too narrow
+constexpr double kDoubt = 1.5;
 constexpr int kStarts = 3;               // thresholds that a search may start with, each half the one before
 constexpr std::size_t kModels = 4;       // the most prominent ones tell the scale
 constexpr std::size_t kFirstModels = 2;  // at first, when the scale is not known
@@ -115,10 +117,12 @@ class Estimate {
         if (best.models.empty()) best.threshold = settled->threshold;
         continue;
       }
-      const auto weight = significance(*settled);
+      auto weight = significance(*settled);
       if (!weight) return tl::unexpected(weight.error());
       const bool generous = starts == 0 && start == kGenerous * unit;
       const bool narrowed = settled->threshold <= (generous ? 1 - kAlike : 1 + kAlike) * start;
+      // So much more it must be worth: several surfaces together fill a slab, too.
+      if (settled->threshold > kWidened * start) *weight /= kDoubt;
       if (best.models.empty() || *weight > most) {
         most = *weight;
         best = std::move(*settled);
@@ -204,8 +208,14 @@ class Estimate {
     cap(ground);
     std::vector<float> caps = caps_;
     for (std::size_t i = 0; i < caps.size(); ++i) caps[i] *= tau / ground.allowed_at(i);
-    const double evenly = std::min(1.0, 2 * scale.threshold / width_) * static_cast<double>(in_.points.finite_count());
-    if (scale.threshold > kWidest * width_) return 0.0;
+    double evenly = 0, wide = 0;
+    for (std::size_t i = 0; i < in_.points.size(); ++i) {
+      if (!in_.points.finite(i)) continue;
+      const auto each = static_cast<double>(ground.allowed_at(i));
+      evenly += std::min(1.0, 2 * each / width_);
+      wide += each;
+    }
+    if (wide > kWidest * width_ * static_cast<double>(in_.points.finite_count())) return 0.0;
     double sum = 0;
     for (const Known& model : scale.models) {
       const models::ModelSpace& space = *kinds_[model.kind].space;

@@ -153,15 +153,12 @@ std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points,
   if (points.finite_count() <= size) return draw_part(points, random, number, size);
   const double share = share_of_steady(points, spread, size);
   std::vector<std::uint32_t> drawn;
-  drawn.reserve(size + 1);
-  // One at each whole number that the sum of shares passes: evenly over the input's order.
-  double sum = Random::unit(random.words(Draw::subset, number, 0, 0)[0]);
-  for (std::size_t i = 0; i < spread.size() && drawn.size() < size; ++i) {
-    if (!points.finite(i)) continue;
-    sum += std::min(1.0, share / static_cast<double>(spread[i]));
-    if (sum < 1) continue;
-    sum -= 1;
-    drawn.push_back(static_cast<std::uint32_t>(i));
+  drawn.reserve(size + size / 8);
+  std::array<std::uint32_t, 4> words{};
+  for (std::size_t i = 0; i < spread.size(); ++i) {
+    if (i % 4 == 0) words = random.words(Draw::subset, number, 0, static_cast<std::uint32_t>(i / 4));
+    if (points.finite(i) && Random::unit(words[i % 4]) * static_cast<double>(spread[i]) < share)
+      drawn.push_back(static_cast<std::uint32_t>(i));
   }
   return drawn;
 }

@@ -22,7 +22,8 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
                                      kernels::FitnessEvaluator* workers = nullptr);
 
 /// The same of a cloud whose points are worth the less the more `spread`, one a point and >= 1, says their noise is: each is drawn with a
-/// probability that falls as 1 / spread, so that what a model saves on them is, on average, counted in units of each point's own noise.
+/// probability that falls as 1 / spread, so that what a model saves on them is, on average, counted in units of each point's own noise. `size`
+/// of them on average, each by itself.
 std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
                                             std::size_t size, std::span<const float> spread);
 

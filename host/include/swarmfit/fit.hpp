@@ -50,7 +50,8 @@ struct FitOptions {
   std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane, sphere, cylinder 0.01;
                                     ///< homography 6 px, fundamental 2.5 px; line2d, circle2d, own, and any with noise, estimate it)
   bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
-  Noise noise = Noise::none;        ///< depth: of 3 columns only; tau is for the near end, beyond a tenth of the points
+  Noise noise = Noise::none;        ///< depth: of 3 columns only; tau is for the near end, beyond three tenths of the points
+                                    ///< it grows with the square of the depth
   Preset preset = Preset::fast;     ///< decides every option below that is left empty
   std::optional<int> particles;     ///< M, >= 2
   std::optional<int> iterations;    ///< most steps of one swarm, >= 1
