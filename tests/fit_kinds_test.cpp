@@ -151,5 +151,99 @@ TEST(FitFundamental, BodiesInMotionAreToldApart) {
   }
 }
 
+/// Bodies of few points among as many wrong correspondences as there are right ones [px]; body 0 is nobody.
+struct Motions {
+  std::vector<double> rows;
+  std::vector<std::size_t> body;
+};
+
+Motions few_points(std::uint64_t seed, std::initializer_list<std::size_t> counts) {
+  std::mt19937_64 engine(seed);
+  const auto uniform = [&](double low, double high) { return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53; };
+  Motions made;
+  std::size_t body = 0;
+  const double places = static_cast<double>(counts.size());
+  for (const std::size_t count : counts) {
+    const double column = 2.0 * static_cast<double>(body) / places - 1 + 1 / places;
+    const Eigen::Vector3d middle(1.8 * column, uniform(-0.6, 0.6), 5), shift(uniform(-0.5, 0.5), uniform(-0.5, 0.5), uniform(-0.5, 0.5));
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(uniform(-0.4, 0.4), Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized())
+            .toRotationMatrix();
+    ++body;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3d p(uniform(-0.4, 0.4), uniform(-0.6, 0.6), uniform(-0.5, 0.5));
+      for (const Eigen::Vector3d& v : {Eigen::Vector3d(p + middle), Eigen::Vector3d(turn * p + middle + shift)}) {
+        made.rows.push_back(600 * v[0] / v[2] + 320 + uniform(-0.7, 0.7));
+        made.rows.push_back(600 * v[1] / v[2] + 240 + uniform(-0.7, 0.7));
+      }
+      made.body.push_back(body);
+    }
+  }
+  for (std::size_t i = made.body.size(); i > 0; --i) {
+    made.rows.insert(made.rows.end(), {uniform(0, 640), uniform(0, 480), uniform(0, 640), uniform(0, 480)});
+    made.body.push_back(0);
+  }
+  return made;
+}
+
+Expected<FitResult> fit_fundamental(const std::vector<double>& rows, std::uint64_t seed) {
+  FitOptions options;
+  options.model = ModelType::fundamental;
+  options.backend = "cpu";
+  options.seed = seed;
+  return fit(PointsView(std::span<const double>(rows), 4), options);
+}
+
+TEST(FitFundamental, MotionsOfFewPointsAreToldApart) {
+  constexpr std::uint64_t kScenes = 12;
+  std::size_t wrong = 0, all = 0, missed = 0;
+  for (std::uint64_t seed = 1; seed <= kScenes; ++seed) {
+    const Motions made = few_points(seed, {45, 35, 25});
+    const auto result = fit_fundamental(made.rows, 1);
+    ASSERT_TRUE(result) << result.error().message;
+    // Each body's points that have the label most of them have, which no body before may have.
+    std::set<std::size_t> used;
+    std::size_t right = 0;
+    for (std::size_t body = 1; body <= 3; ++body) {
+      std::vector<std::size_t> votes(result->models.size() + 1, 0);
+      for (std::size_t i = 0; i < made.body.size(); ++i) votes[result->labels[i]] += made.body[i] == body ? 1 : 0;
+      const auto most = static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
+      if (most != 0 && used.insert(most).second) right += votes[most];
+    }
+    for (std::size_t i = 0; i < made.body.size(); ++i) right += made.body[i] == 0 && result->labels[i] == 0 ? 1 : 0;
+    wrong += made.body.size() - right;
+    all += made.body.size();
+    missed += result->models.size() != 3 ? 1 : 0;
+  }
+  EXPECT_LT(static_cast<double>(wrong) / static_cast<double>(all), 0.022);
+  EXPECT_LE(missed, 1U);
+}
+
+TEST(FitFundamental, WhereNoSwarmFindsWhatPaysTheJointEndLooks) {
+  // Four bodies of a twelfth of the correspondences each: the first swarms' bests straddle them, and nothing pays by itself.
+  std::size_t told_apart = 0;
+  for (const std::uint64_t scene : {3, 4, 5, 6, 14, 15}) {
+    Motions made = few_points(scene, {26, 26, 26, 26});
+    std::mt19937_64 engine(scene);
+    for (int i = 0; i < 400; ++i) made.rows.push_back((i % 2 == 0 ? 640 : 480) * static_cast<double>(engine() >> 11) * 0x1p-53);
+    const auto result = fit_fundamental(made.rows, 1);
+    ASSERT_TRUE(result) << result.error().message;
+    told_apart += result->models.size() == 4 ? 1 : 0;
+  }
+  EXPECT_GE(told_apart, 5U);
+}
+
+TEST(FitFundamental, WrongCorrespondencesAreNoMotion) {
+  std::mt19937_64 engine(1);
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    std::vector<double> rows;
+    for (std::size_t i = 0; i < 4 * 50 * seed; ++i)
+      rows.push_back((i % 2 == 0 ? 640 : 480) * static_cast<double>(engine() >> 11) * 0x1p-53);
+    const auto result = fit_fundamental(rows, seed);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_TRUE(result->models.empty()) << 50 * seed << " correspondences";
+  }
+}
+
 }  // namespace
 }  // namespace swarmfit

@@ -22,14 +22,13 @@ constexpr double kCoherent = 0.5;     // share of neighbours alike, beyond chanc
 constexpr int kCycles = 3;            // of expansions over all labels
 constexpr std::size_t kSmoothed = 6;  // nearest neighbours that a point would agree with
 
-/// A number that tells a set of points from others (Fowler, Noll and Vo's hash); odd.
+}  // namespace
+
 std::uint64_t mark_of(std::span<const std::uint32_t> points) {
   std::uint64_t mark = 14695981039346656037U;
   for (const std::uint32_t i : points) mark = (mark ^ (i + 1ULL)) * 1099511628211U;
   return mark | 1;
 }
-
-}  // namespace
 
 Labelling::Labelling(const Ground& ground, const Subset& part, const models::Neighbours& neighbours, const LabelPrices& prices)
     : ground_(ground), part_(part), prices_(prices) {
@@ -45,6 +44,18 @@ Labelling::Labelling(const Ground& ground, const Subset& part, const models::Nei
   edges_.assign(asked.begin(), asked.end());
 }
 
+float Labelling::bent(float distance) const {
+  if (!(prices_.bend > 0)) return distance;
+  const float bend = static_cast<float>(prices_.bend), far = distance / ground_.tau;
+  return ground_.tau * std::log1p(far / bend) / std::log1p(1 / bend);
+}
+
+float Labelling::unbent(float cost) const {
+  if (!(prices_.bend > 0)) return cost;
+  const float bend = static_cast<float>(prices_.bend);
+  return ground_.tau * bend * std::expm1(cost / ground_.tau * std::log1p(1 / bend));
+}
+
 Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const models::Position> models) const {
   ModelRows rows(ground_.points.frame(), models.size());
   for (const models::Position& theta : models) rows.add(ground_.space, theta);
@@ -54,6 +65,7 @@ Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const mod
   if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), all, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
+  for (float& one : all) one = bent(one);
   std::vector<std::vector<float>> distances(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     distances[m].assign(all.begin() + static_cast<std::ptrdiff_t>(m * points), all.begin() + static_cast<std::ptrdiff_t>((m + 1) * points));
@@ -142,19 +154,32 @@ Expected<> Labelling::alternate(State& state, double hopeless) {
   return {};
 }
 
+void Labelling::remove(State& state, std::size_t model) {
+  const auto at = static_cast<std::ptrdiff_t>(model);
+  state.models.erase(state.models.begin() + at);
+  state.distances.erase(state.distances.begin() + at);
+  state.fitted.erase(state.fitted.begin() + at);
+  for (std::uint16_t& l : state.labels) {
+    if (l == model + 1) l = 0;
+    if (l > model + 1) --l;
+  }
+}
+
+Expected<bool> Labelling::adopt(State&& with, double hopeless) {
+  label(with);
+  if (auto done = alternate(with, hopeless); !done) return tl::unexpected(done.error());
+  if (!(with.energy < state_.energy - kLeastFall)) return false;
+  state_ = std::move(with);
+  return true;
+}
+
 Expected<bool> Labelling::drop_one() {
   // The one that costs least to do without, judged before its neighbours adapt.
   State best;
   std::size_t worst = state_.models.size();
   for (std::size_t m = 0; m < state_.models.size(); ++m) {
     State without = state_;
-    without.models.erase(without.models.begin() + static_cast<std::ptrdiff_t>(m));
-    without.distances.erase(without.distances.begin() + static_cast<std::ptrdiff_t>(m));
-    without.fitted.erase(without.fitted.begin() + static_cast<std::ptrdiff_t>(m));
-    for (std::uint16_t& l : without.labels) {
-      if (l == m + 1) l = 0;
-      if (l > m + 1) --l;
-    }
+    remove(without, m);
     label(without);
     if (worst == state_.models.size() || without.energy < best.energy) {
       best = std::move(without);
@@ -184,7 +209,9 @@ double Labelling::cost(std::size_t point) const {
 
 void Labelling::costs(std::span<float> costs) const {
   std::fill(costs.begin(), costs.end(), 0.0F);
-  for (std::size_t i = 0; i < part_.index().size(); ++i) costs[part_.index()[i]] = static_cast<float>(std::min(1.0, cost(i))) * ground_.tau;
+  for (std::size_t i = 0; i < part_.index().size(); ++i) {
+    costs[part_.index()[i]] = unbent(static_cast<float>(std::min(1.0, cost(i))) * ground_.tau);
+  }
 }
 
 Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<const float> distances) {
@@ -192,12 +219,9 @@ Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<co
   with.models.push_back(proposal);
   with.distances.emplace_back(distances.begin(), distances.end());
   with.fitted.push_back(0);
-  label(with);
-  if (auto done = alternate(with, state_.energy + kHopeless * prices_.model); !done) return tl::unexpected(done.error());
-  if (!(with.energy < state_.energy - kLeastFall)) return false;
-  state_ = std::move(with);
-  kept_.push_back(kJoined);
-  return true;
+  auto adopted = adopt(std::move(with), state_.energy + kHopeless * prices_.model);
+  if (adopted && *adopted) kept_.push_back(kJoined);
+  return adopted;
 }
 
 void Labelling::weigh_gains(std::span<const std::vector<float>> distances, std::vector<double>& gains) const {
@@ -216,7 +240,7 @@ Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
   std::vector<double> gains(proposals.size(), std::numeric_limits<double>::infinity());
   weigh_gains(*distances, gains);
   bool any = false;
-  for (int failures = 0; failures < kFailures;) {
+  for (int failures = 0; failures < kFailures && !full();) {
     const auto best = std::max_element(gains.begin(), gains.end());
     if (best == gains.end() || !(*best > kPromising * prices_.model)) break;
     const auto p = static_cast<std::size_t>(best - gains.begin());

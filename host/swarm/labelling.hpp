@@ -17,10 +17,15 @@
 
 namespace swarmfit::swarm {
 
+/// A number that tells a set of points from others (Fowler, Noll and Vo's hash); odd.
+std::uint64_t mark_of(std::span<const std::uint32_t> points);
+
 /// Energy of a labelling l and models theta (PEaRL; Isack and Boykov 2012):
 ///
-///   E = sum_i D_i(l_i) + smoothness sum_(i,j) V(l_i, l_j) + model |{l_i}|,  D_i(k) = d_ik / tau_i where d_ik <= 2 tau_i, D_i(0) = 1,
+///   E = sum_i D_i(l_i) + smoothness sum_(i,j) V(l_i, l_j) + model |{l_i}|,  D_i(k) = d_ik / tau where that is at most 2, D_i(0) = 1,
 ///   V(k, l) = [k != l], half that where one of them is 0
+///
+/// with d / tau bent to log(1 + d / (bend tau)) / log(1 + 1 / bend) where the prices ask for it.
 ///
 /// Alternates labels (alpha-expansion) and least squares on each model's own points, and drops a model where that saves more than it
 /// explains; the energy never rises. Labels: 0 none, k the k-th of `models`, one a point of the cloud.
@@ -29,12 +34,29 @@ class Labelling {
   /// `part` must hold every finite point of the cloud.
   Labelling(const Ground& ground, const Subset& part, const models::Neighbours& neighbours, const LabelPrices& prices);
 
+  /// No more models than that, from now on; 0: no bound.
+  void bound(std::size_t most) noexcept { most_ = most; }
   /// Shares the points out among `models` and refits these.
   Expected<> start(std::span<const models::Position> models);
   /// Takes in those of the proposals that lower the energy; true if there were any.
   Expected<bool> offer(std::span<const models::Position> proposals);
   /// Drops models while that lowers the energy.
   Expected<> drop();
+
+  // Moves of what is there, each made where it lowers the energy; true if it was. Proposals are models through samples of points that the
+  // model, or the two, own. In labelling_moves.cpp.
+  /// A proposal, fitted to what it wins of the others, takes the model's place.
+  Expected<bool> replace(std::size_t model, std::span<const models::Position> proposals);
+  /// A proposal takes some of the model's points, and both are fitted to theirs.
+  Expected<bool> split(std::size_t model, std::span<const models::Position> proposals);
+  /// A proposal, fitted to the points of both, takes their place.
+  Expected<bool> join(std::size_t one, std::size_t other, std::span<const models::Position> proposals);
+  /// What ends of edges cost because one is this model's and the other that one's.
+  double border(std::size_t one, std::size_t other) const;
+  /// Marks the points of the cloud that a model owns with 1, and leaves the others as they are.
+  void mark_owned(std::size_t model, std::span<float> marks) const;
+  /// A number that tells the set of a model's points from others.
+  std::uint64_t owned_set(std::size_t model) const;
 
   const std::vector<models::Position>& models() const noexcept { return state_.models; }
   /// What each point of the cloud costs as things stand, at most tau [data unit]; tau where no model owns it, 0 where it is not finite.
@@ -48,24 +70,36 @@ class Labelling {
  private:
   struct State {
     std::vector<models::Position> models;
-    std::vector<std::vector<float>> distances;  // of each model, one a point of the part
+    std::vector<std::vector<float>> distances;  // of each model, one a point of the part, as they count: bent
     std::vector<std::uint64_t> fitted;          // of each model, what tells the points that it was last fitted to, and how often; 0 none
     std::vector<std::uint16_t> labels;          // one a point of the part
     double energy = 0;
   };
 
-  /// Of each model to each point of the part.
+  /// Of each model to each point of the part, bent.
   Expected<std::vector<std::vector<float>>> measure(std::span<const models::Position> models) const;
+  /// What a distance counts as, so that tau stays tau: small ones tell models apart, and large ones hardly. And back [data unit].
+  float bent(float distance) const;
+  float unbent(float cost) const;
   /// The labels of the state's models, from those it has where they may stay; and the energy.
   void label(State& state);
   Expected<bool> refit(State& state);
   Expected<bool> drop_one();
   Expected<bool> try_one(const models::Position& proposal, std::span<const float> distances);
   double cost(std::size_t point) const;
+  bool full() const noexcept { return most_ > 0 && state_.models.size() >= most_; }
   /// How much more alike neighbours are than chance would have it, in [0, 1], over the edges at points that models own.
   double coherence() const;
   /// Labels and models in turn while the energy falls, or until it is found above `hopeless`.
   Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity());
+  /// The state becomes `with`, labelled and fitted, where that lowers the energy.
+  Expected<bool> adopt(State&& with, double hopeless = std::numeric_limits<double>::infinity());
+  static void remove(State& state, std::size_t model);
+  /// Input indices of a model's points.
+  std::vector<std::uint32_t> owned(std::size_t model) const;
+  /// Fits a model to those points of the part that `takes` names; it stays where they do not determine one.
+  template <class Takes>
+  void fit_to(Takes&& takes, models::Position& theta) const;
   /// What each proposal would save of what the points cost as things stand, in units of tau.
   void weigh_gains(std::span<const std::vector<float>> distances, std::vector<double>& gains) const;
 
@@ -77,6 +111,7 @@ class Labelling {
   double potts_smoothness_ = -1;
   State state_;
   std::vector<std::size_t> kept_;
+  std::size_t most_ = 0;
 };
 
 }  // namespace swarmfit::swarm

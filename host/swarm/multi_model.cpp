@@ -449,7 +449,7 @@ Expected<> MultiModel::deflate(const Candidate& candidate) {
 }
 
 Expected<> MultiModel::finish(FitResult& result) {
-  if (settings_.joint && !found_.empty() && !limits_.stop.stop_requested()) {
+  if (settings_.joint && !limits_.stop.stop_requested() && (!found_.empty() || (shares_out() && !full()))) {
     if (auto done = polish(); !done) return done;
     if (shares_out()) return share_out(result);
     // With many points the polished models are where the joint refit would leave them.
@@ -480,59 +480,6 @@ Expected<> MultiModel::share_out_locally() {
     if (levelled(one, room).data() == room.data()) one.swap(room);
   }
   labels_ = label_locally(points_, *distances, tau_);
-  return {};
-}
-
-bool MultiModel::shares_out() const noexcept { return settings_.joint && !part_searched_ && settings_.prices.smoothness > 0; }
-
-Expected<> MultiModel::search_further(Labelling& labelling) {
-  // Swarms look for what lowers the joint energy: each point may still save what it costs now. Two models that the first search took for
-  // one come apart here, and what was too little to be seen beside the large ones is seen.
-  constexpr float kAnyPoint = 0;
-  const std::string before = stop_reason_;
-  while (!interrupted()) {
-    labelling.costs(caps_);
-    if (auto done = show(caps_); !done) return done;
-    Swarm swarm(space(0), settings_, random_);
-    auto flown = fly(swarm, 0, round_++, {}, caps_, kAnyPoint);
-    if (!flown) return tl::unexpected(flown.error());
-    if (!*flown) {
-      if (!interrupted()) stop_reason_ = before;
-      return {};
-    }
-    Candidate candidate;
-    candidate.theta = swarm.best();
-    if (auto done = refine(candidate); !done) return done;
-    std::vector<models::Position> proposals(swarm.own_bests().begin(), swarm.own_bests().end());
-    proposals.push_back(std::move(candidate.theta));
-    auto joined = labelling.offer(proposals);
-    if (!joined) return tl::unexpected(joined.error());
-    if (!*joined) return {};
-  }
-  return {};
-}
-
-Expected<> MultiModel::share_out(FitResult& result) {
-  Labelling labelling(ground_, part_, neighbours_, settings_.prices);
-  std::vector<models::Position> start;
-  for (const models::Placed& model : found_) start.push_back(model.theta);
-  if (auto done = labelling.start(start); !done) return done;
-  if (auto joined = labelling.offer(proposals_); !joined) return tl::unexpected(joined.error());
-  if (auto done = search_further(labelling); !done) return done;
-  if (auto done = labelling.drop(); !done) return done;
-  found_.clear();
-  for (const models::Position& theta : labelling.models()) found_.push_back({&space(0), theta});
-  std::vector<Model> kept;
-  for (const std::size_t m : labelling.kept()) {
-    kept.emplace_back();
-    if (m != Labelling::kJoined) kept.back() = std::move(result.models[m]);
-    kept.back().type = space(0).type();
-  }
-  result.models = std::move(kept);
-  tell_parameters(result);
-  labels_.resize(points_.size());
-  labelling.write(labels_);
-  count_effort(result);
   return {};
 }
 

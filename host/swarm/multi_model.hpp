@@ -133,6 +133,14 @@ class MultiModel {
   Expected<> share_out(FitResult& result);
   Expected<> share_out_locally();
   Expected<> search_further(Labelling& labelling);
+  /// Does one of these pay for itself, beside no other?
+  Expected<bool> any_pays(std::span<const models::Position> models);
+  /// Models are replaced, split and joined by samples of their own points while that lowers the joint energy.
+  Expected<> regroup(Labelling& labelling);
+  Expected<bool> regroup_one(Labelling& labelling, std::size_t model);
+  Expected<bool> regroup_two(Labelling& labelling, std::size_t one, std::size_t other);
+  /// `samples` and models through so many samples of the points of which marks are not 0; none where these are too few.
+  std::vector<models::Position> samples_of(std::span<const float> marks, int count, std::vector<models::Position> samples);
   Expected<> drop_unpaid(FitResult& result);
   std::optional<std::string> interrupted() const;
   void restore_caps();

@@ -23,16 +23,26 @@ Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint3
   alive_.assign(candidates.size(), 1);
 }
 
-void Sampler::prefer_unexplained(std::span<const float> caps, float least) {
+bool Sampler::leave_out(std::span<const float> values, float least, std::size_t enough) {
   live_.clear();
   for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
-    alive_[place] = caps[candidates_[place]] >= least ? 1 : 0;
+    alive_[place] = values[candidates_[place]] >= least ? 1 : 0;
     if (alive_[place] != 0) live_.push_back(place);
   }
-  if (live_.size() >= static_cast<std::size_t>(4 * space_.minimal_sample())) return;
+  if (live_.size() >= enough) return true;
   live_.resize(candidates_.size());
   std::iota(live_.begin(), live_.end(), 0U);
   alive_.assign(candidates_.size(), 1);
+  return false;
+}
+
+void Sampler::prefer_unexplained(std::span<const float> caps, float least) {
+  leave_out(caps, least, static_cast<std::size_t>(4 * space_.minimal_sample()));
+}
+
+bool Sampler::keep_to(std::span<const float> marks) {
+  constexpr float kMarked = 0.5F;
+  return leave_out(marks, kMarked, static_cast<std::size_t>(space_.minimal_sample() + 2));
 }
 
 bool Sampler::nearby(std::size_t first, std::span<const std::uint32_t> words, std::span<std::uint32_t> places) const {

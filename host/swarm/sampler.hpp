@@ -23,8 +23,13 @@ class Sampler {
 
   /// Leaves out candidates whose cap has sunk below `least`, as long as enough remain.
   void prefer_unexplained(std::span<const float> caps, float least);
+  /// Draws from candidates of which marks are not 0 alone; false, and nothing changes, where these are hardly more than a sample.
+  bool keep_to(std::span<const float> marks);
 
  private:
+  /// Leaves out candidates whose value is below `least`; all are left where that leaves fewer than `enough`.
+  bool leave_out(std::span<const float> values, float least, std::size_t enough);
+
   const models::WorkingPoints& points_;
   const models::ModelSpace& space_;
   const Random& random_;

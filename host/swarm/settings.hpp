@@ -11,6 +11,7 @@ namespace swarmfit::swarm {
 struct LabelPrices {
   double smoothness = 0;  ///< two neighbours with different labels, for each of the two that counts the other among its nearest
   double model = 0;       ///< a model that is used at all
+  double bend = 0;        ///< of tau: beyond it what a distance costs grows as its logarithm does; 0: it grows evenly
 };
 
 /// Whom a particle follows beside itself.

@@ -1,0 +1,184 @@
+// Moves of the joint end beyond labels and fits in turn: least squares stays in the basin that a swarm left it in, so each model is asked
+// whether one through a few of its own points does better, whether it is two, and whether two are one.
+#include <algorithm>
+#include <array>
+
+#include "host/swarm/labelling.hpp"
+#include "host/swarm/payment.hpp"
+
+namespace swarmfit::swarm {
+namespace {
+
+constexpr std::size_t kTried = 3;      // proposals that are fitted, those that promise most
+constexpr int kFits = 2;               // of a proposal and what it wins, in turn
+constexpr double kHint = 0.3;          // of a model's price that a proposal must save before a model is taken for two
+constexpr double kWorthTrying = 0.75;  // of a model's price that the halves of a model must save before they are labelled
+constexpr double kWithinReach = 3;     // of what joining saves that a proposal may cost before it is fitted to the points of both
+
+/// The places of the `count` largest, the largest first.
+std::vector<std::size_t> largest(std::span<const double> values, std::size_t count) {
+  std::vector<std::size_t> order(values.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size()));
+  std::partial_sort(order.begin(), end, order.end(),
+                    [&](std::size_t a, std::size_t b) { return values[a] != values[b] ? values[a] > values[b] : a < b; });
+  order.erase(end, order.end());
+  return order;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> Labelling::owned(std::size_t model) const {
+  std::vector<std::uint32_t> own;
+  for (std::size_t i = 0; i < state_.labels.size(); ++i) {
+    if (state_.labels[i] == model + 1) own.push_back(part_.index()[i]);
+  }
+  return own;
+}
+
+void Labelling::mark_owned(std::size_t model, std::span<float> marks) const {
+  for (const std::uint32_t i : owned(model)) marks[i] = 1;
+}
+
+std::uint64_t Labelling::owned_set(std::size_t model) const { return mark_of(owned(model)); }
+
+double Labelling::border(std::size_t one, std::size_t other) const {
+  const std::size_t a = one + 1, b = other + 1;
+  double sum = 0;
+  for (const auto& [ends, count] : edges_) {
+    const std::size_t first = state_.labels[static_cast<std::size_t>(ends.first)],
+                      second = state_.labels[static_cast<std::size_t>(ends.second)];
+    if ((first == a && second == b) || (first == b && second == a)) sum += count * prices_.smoothness;
+  }
+  return sum;
+}
+
+template <class Takes>
+void Labelling::fit_to(Takes&& takes, models::Position& theta) const {
+  std::vector<std::uint32_t> own;
+  for (std::size_t i = 0; i < part_.index().size(); ++i) {
+    if (takes(i)) own.push_back(part_.index()[i]);
+  }
+  const std::vector<double> weight(own.size(), 1.0);
+  models::Position fitted = theta;
+  if (ground_.space.refine(ground_.points, {own, weight}, fitted)) theta = std::move(fitted);
+}
+
+Expected<bool> Labelling::replace(std::size_t model, std::span<const models::Position> proposals) {
+  // What each point costs without this model.
+  std::vector<float> without(part_.index().size(), ground_.tau);
+  for (std::size_t i = 0; i < without.size(); ++i) {
+    const std::size_t l = state_.labels[i];
+    if (l != 0 && l != model + 1) without[i] = std::min(ground_.tau, state_.distances[l - 1][i]);
+  }
+  std::vector<models::Position> tried(proposals.begin(), proposals.end());
+  std::vector<std::vector<float>> distances;
+  std::vector<double> gains;
+  for (int fit = 0; fit <= kFits; ++fit) {
+    auto measured = measure(tried);
+    if (!measured) return tl::unexpected(measured.error());
+    distances = std::move(*measured);
+    gains.clear();
+    for (const std::vector<float>& one : distances) gains.push_back(saved(without, one));
+    if (fit == kFits) break;
+    std::vector<models::Position> next;
+    for (const std::size_t p : largest(gains, kTried)) {
+      fit_to([&](std::size_t i) { return distances[p][i] < without[i]; }, tried[p]);
+      next.push_back(std::move(tried[p]));
+    }
+    tried = std::move(next);
+  }
+  const std::size_t p = largest(gains, 1).front();
+  if (!(gains[p] > saved(without, state_.distances[model]))) return false;
+  State with = state_;
+  with.models[model] = tried[p];
+  with.distances[model] = std::move(distances[p]);
+  with.fitted[model] = 0;
+  return adopt(std::move(with));
+}
+
+Expected<bool> Labelling::split(std::size_t model, std::span<const models::Position> proposals) {
+  if (full()) return false;
+  const auto ours = [&](std::size_t i) { return state_.labels[i] == model + 1; };
+  const std::size_t points = part_.index().size();
+  std::vector<float> now(points, 0);
+  for (std::size_t i = 0; i < points; ++i) now[i] = ours(i) ? std::min(ground_.tau, state_.distances[model][i]) : 0.0F;
+  auto measured = measure(proposals);
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<double> gains;
+  for (const std::vector<float>& one : *measured) gains.push_back(saved(now, one));
+  for (const std::size_t p : largest(gains, kTried)) {
+    if (gains[p] < kHint * prices_.model * static_cast<double>(ground_.tau)) break;
+    std::array<models::Position, 2> halves{state_.models[model], proposals[p]};
+    std::vector<std::vector<float>> distances{state_.distances[model], (*measured)[p]};
+    for (int fit = 0; fit < kFits; ++fit) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        fit_to([&](std::size_t i) { return ours(i) && (k == 0 ? distances[0][i] <= distances[1][i] : distances[1][i] < distances[0][i]); },
+               halves[k]);
+      }
+      auto again = measure(halves);
+      if (!again) return tl::unexpected(again.error());
+      distances = std::move(*again);
+    }
+    std::vector<float> both = distances[0];
+    take_nearer(distances[1], both);
+    if (!(saved(now, both) > kWorthTrying * prices_.model * static_cast<double>(ground_.tau))) continue;
+    State with = state_;
+    with.models[model] = halves[0];
+    with.distances[model] = std::move(distances[0]);
+    with.fitted[model] = 0;
+    with.models.push_back(halves[1]);
+    with.distances.push_back(std::move(distances[1]));
+    with.fitted.push_back(0);
+    auto adopted = adopt(std::move(with));
+    if (!adopted || !*adopted) {
+      if (!adopted) return adopted;
+      continue;
+    }
+    kept_.push_back(kJoined);
+    return true;
+  }
+  return false;
+}
+
+Expected<bool> Labelling::join(std::size_t one, std::size_t other, std::span<const models::Position> proposals) {
+  const auto ours = [&](std::size_t i) { return state_.labels[i] == one + 1 || state_.labels[i] == other + 1; };
+  const std::size_t points = part_.index().size();
+  std::vector<float> most(points, 0);
+  double now = 0, all = 0;
+  for (std::size_t i = 0; i < points; ++i) {
+    if (!ours(i)) continue;
+    most[i] = ground_.tau;
+    now += cost(i);
+    ++all;
+  }
+  auto measured = measure(proposals);
+  if (!measured) return tl::unexpected(measured.error());
+  std::vector<double> gains;
+  for (const std::vector<float>& each : *measured) gains.push_back(saved(most, each));
+  const std::size_t best = largest(gains, 1).front();
+  const double saves = prices_.model + border(one, other), tau = static_cast<double>(ground_.tau);
+  if (all - gains[best] / tau - now > kWithinReach * saves) return false;
+  models::Position theta = proposals[best];
+  std::vector<float> distances = std::move((*measured)[best]);
+  for (int fit = 0; fit < kFits; ++fit) {
+    fit_to([&](std::size_t i) { return ours(i) && distances[i] < ground_.tau; }, theta);
+    auto again = measure({&theta, 1});
+    if (!again) return tl::unexpected(again.error());
+    distances = std::move(again->front());
+  }
+  if (all - saved(most, distances) / tau - now > saves) return false;
+  State with = state_;
+  for (std::uint16_t& l : with.labels) {
+    if (l == other + 1) l = static_cast<std::uint16_t>(one + 1);
+  }
+  with.models[one] = std::move(theta);
+  with.distances[one] = std::move(distances);
+  with.fitted[one] = 0;
+  remove(with, other);
+  auto adopted = adopt(std::move(with));
+  if (adopted && *adopted) kept_.erase(kept_.begin() + static_cast<std::ptrdiff_t>(other));
+  return adopted;
+}
+
+}  // namespace swarmfit::swarm
