@@ -11,9 +11,13 @@ namespace {
 
 constexpr std::uint32_t kFirstContest = 1U << 31;  // rounds of contests, apart from those of the search
 constexpr double kAlong = 0.8;                     // cosine of the angle between a point's normal and the model's
+constexpr std::size_t kStretches = 6;              // of a swarm's ring, whose bests are looked at
 constexpr int kBriefStall = 1;                     // still steps that end a swarm on one model's points
 constexpr double kGathered = 0.65;                 // share of a curved model's points that must gather about it
 constexpr double kWellGathered = 0.8;              // the same: above, it is not asked against as many faces as a box has
+constexpr double kHeld = 0.4;                      // share of its points that must lie along it, times that of neighbours alike,
+constexpr double kHeldPerBeside = 2;               // and so much more for each point beside it, of its own
+constexpr std::size_t kBesides = 8;                // nearest neighbours of a point that are asked whose they are
 constexpr double kClearly = 1.1;                   // times what a flat model is worth: a curved one must be worth more
 
 /// The caps of those points that a model explains; 0 elsewhere.
@@ -22,6 +26,22 @@ std::vector<float> own_caps(std::span<const float> caps, std::span<const float> 
   for (std::size_t i = 0; i < caps.size(); ++i) own[i] = distances[i] < caps[i] ? caps[i] : 0.0F;
   return own;
 }
+
+/// How many of a model's points lie along it, of those whose surface is known; one is added so that no points are no cause for doubt.
+class Along {
+ public:
+  void count(const models::WorkingPoints& points, std::uint32_t i, const models::ModelSpace& space, const models::Position& theta) {
+    const Eigen::Vector3d normal = points.normal(i);
+    if (normal.isZero()) return;
+    const Eigen::Vector3d outward = space.outward(theta, points.point<3>(i));
+    ++all_;
+    if (std::abs(normal.dot(outward)) >= kAlong * outward.norm()) ++along_;
+  }
+  double share() const noexcept { return along_ / all_; }
+
+ private:
+  double all_ = 1, along_ = 1;
+};
 
 }  // namespace
 
@@ -38,15 +58,11 @@ double MultiModel::worth(const Candidate& candidate) const {
 double MultiModel::agreement(std::size_t kind, const models::Position& theta, std::span<const float> caps,
                              std::span<const float> distances) const {
   if (!points_.has_normals()) return 1;
-  double all = 1, along = 1;
+  Along tally;
   for (const std::uint32_t i : part_.index()) {
-    if (!(distances[i] < caps[i])) continue;
-    const Eigen::Vector3d normal = points_.normal(i), outward = space(kind).outward(theta, points_.point<3>(i));
-    if (normal.isZero()) continue;
-    ++all;
-    if (std::abs(normal.dot(outward)) >= kAlong * outward.norm()) ++along;
+    if (distances[i] < caps[i]) tally.count(points_, i, space(kind), theta);
   }
-  return along / all;
+  return tally.share();
 }
 
 double MultiModel::gathered(const Candidate& candidate) const {
@@ -65,6 +81,27 @@ double MultiModel::gathered(const Candidate& candidate) const {
   return inner / std::max(1.0, all) * agreement(candidate.kind, candidate.theta, caps_, candidate.distances);
 }
 
+double MultiModel::held(const Candidate& candidate) const {
+  const std::span<const std::uint32_t> index = part_.index();
+  const auto own = [&](std::uint32_t i) { return candidate.distances[i] < caps_[i]; };
+  double all = 0, like = 0;
+  for (std::size_t place = 0; place < index.size(); ++place) {
+    if (!own(index[place])) continue;
+    const auto near = neighbours_.of(place).first(std::min(kBesides, neighbours_.count()));
+    all += static_cast<double>(near.size());
+    like += static_cast<double>(std::count_if(near.begin(), near.end(), [&](std::uint32_t other) { return own(index[other]); }));
+  }
+  return like / std::max(1.0, all) * agreement(candidate.kind, candidate.theta, caps_, candidate.distances);
+}
+
+bool MultiModel::is_strewn(const Candidate& candidate) const {
+  if (points_.dimension() != 3) return false;
+  // What is one surface is a peak as well: among outliers its points have strangers for neighbours, but hardly any in the slab beside it.
+  const Support& support = candidate.support;
+  const double beside = static_cast<double>(support.slabs[1]) / static_cast<double>(std::max<std::size_t>(support.inliers(), 1));
+  return held(candidate) < kHeld + kHeldPerBeside * beside;
+}
+
 double MultiModel::saving(std::size_t kind, const models::Position& theta, std::span<const float> caps,
                           std::span<const float> distances) const {
   std::vector<float> caps_room, room;
@@ -73,28 +110,72 @@ double MultiModel::saving(std::size_t kind, const models::Position& theta, std::
 
 std::size_t MultiModel::flat_kind(std::size_t curved) const noexcept {
   if (!is_curved(space(curved).type())) return kinds_.size();
-  if (kinds_.back().hidden) return kinds_.size() - 1;
+  if (hides_flat()) return kinds_.size() - 1;
   const ModelType flat = flat_of(space(curved).type());
   const auto at = std::find_if(kinds_.begin(), kinds_.end(), [&](const Kind& kind) { return kind.space->type() == flat; });
   return static_cast<std::size_t>(at - kinds_.begin());
 }
 
-Expected<MultiModel::Outcome> MultiModel::contest(Candidate& winner) {
-  for (std::size_t kind = 0; kind < asked_; ++kind) {
-    if (kind == winner.kind || !is_curved(space(kind).type())) continue;
-    Candidate challenger;
-    challenger.kind = kind;
-    auto there = challenge(winner, challenger);
-    if (!there) return tl::unexpected(there.error());
-    if (interrupted()) return Outcome::interrupted;
-    if (*there && worth(challenger) > worth(winner)) winner = std::move(challenger);
+Expected<> MultiModel::choose(const Swarm& swarm, Candidate& candidate) const {
+  // Neighbours on the ring know alike: one of each stretch is enough.
+  const std::size_t particles = swarm.own_bests().size();
+  std::vector<models::Placed> known{{&space(candidate.kind), swarm.best()}};
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    const std::size_t first = k * particles / kStretches, last = (k + 1) * particles / kStretches;
+    const auto stretch = swarm.own_fitness().subspan(first, last - first);
+    if (stretch.empty()) continue;
+    const auto best = static_cast<std::size_t>(std::min_element(stretch.begin(), stretch.end()) - stretch.begin());
+    known.push_back({&space(candidate.kind), swarm.own_bests()[first + best]});
   }
+  const auto distances = measure(part_ground_, known);
+  if (!distances) return tl::unexpected(distances.error());
+  double most = 0;
+  for (std::size_t m = 0; m < known.size(); ++m) {
+    const double now = saving_along(candidate.kind, known[m].theta, (*distances)[m]);
+    if (!(now > most)) continue;
+    most = now;
+    candidate.theta = known[m].theta;
+  }
+  return {};
+}
+
+double MultiModel::saving_along(std::size_t kind, const models::Position& theta, std::span<const float> distances) const {
+  Along tally;
+  double saved = 0;
+  for (std::size_t k = 0; k < distances.size(); ++k) {
+    if (!(distances[k] < part_caps_[k])) continue;
+    saved += static_cast<double>(part_caps_[k] - distances[k]) / static_cast<double>(part_ground_.allowed_at(k));
+    tally.count(points_, part_.index()[k], space(kind), theta);
+  }
+  return saved * tally.share();
+}
+
+Expected<MultiModel::Outcome> MultiModel::contest(Candidate& winner) {
+  if (auto done = challenge_by(0, asked_, winner); !done) return tl::unexpected(done.error());
+  if (interrupted()) return Outcome::interrupted;
   if (flat_kind(winner.kind) == kinds_.size()) return Outcome::found;
   models::Position flat;
   auto curved = bends(winner, flat);
   if (!curved) return tl::unexpected(curved.error());
   if (interrupted()) return Outcome::interrupted;
-  return *curved ? Outcome::found : flatten(winner, std::move(flat));
+  if (!*curved) return flatten(winner, std::move(flat));
+  // What is round in another way than was asked for is not to be pieced together.
+  if (auto done = challenge_by(asked_, kinds_.size(), winner); !done) return tl::unexpected(done.error());
+  if (interrupted()) return Outcome::interrupted;
+  return kinds_[winner.kind].hidden ? Outcome::flat : Outcome::found;
+}
+
+Expected<> MultiModel::challenge_by(std::size_t first, std::size_t last, Candidate& winner) {
+  for (std::size_t kind = first; kind < last; ++kind) {
+    if (kind == winner.kind || !is_curved(space(kind).type())) continue;
+    Candidate challenger;
+    challenger.kind = kind;
+    auto there = challenge(winner, challenger);
+    if (!there) return tl::unexpected(there.error());
+    if (interrupted()) return {};
+    if (*there && worth(challenger) > worth(winner)) winner = std::move(challenger);
+  }
+  return {};
 }
 
 Expected<bool> MultiModel::best_on(std::size_t kind, std::span<const float> caps, models::Position& theta, std::vector<float>& distances) {
@@ -131,16 +212,16 @@ Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat
   std::vector<float> caps = own_caps(caps_, winner.distances), distances(caps.size());
   const double own = worth(saving(winner.kind, winner.theta, caps, winner.distances), space(winner.kind).freedom());
   const double share = gathered(winner);
-  const bool loose = share < kGathered;
+  const bool strewn = share < kGathered || is_strewn(winner);
   const int most = share < kWellGathered ? kFaces : kFlats;
   double together = 0;
   for (int flats = 1; flats <= most; ++flats) {
     models::Position theta;
     auto there = best_on(kind, caps, theta, distances);
     if (!there) return there;
-    if (!*there) return !loose;
+    if (!*there) return !strewn;
     if (flats == 1) flat = theta;
-    if (loose) return false;
+    if (strewn) return false;
     together += saving(kind, theta, caps, distances);
     const double theirs = worth(together, flats * space(kind).freedom());
     if (own <= kClearly * theirs) return false;

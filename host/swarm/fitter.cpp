@@ -234,20 +234,21 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   search->watched_by(state_->observer ? &watch : nullptr);
   if (points_set) search->points_are_set();
   if (auto done = search->run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
-  std::vector<models::Placed> found = search->found();
+  std::vector<models::Placed> found = search->found(), hidden = search->hidden();
   const auto tau = static_cast<float>(result.threshold);
   const std::vector<float> allowed = swarm::allowed_by(thin_rows ? swarm::spread_of(options.noise, *whole, depth) : spread, tau);
   const swarm::Ground ground{.evaluator = evaluator, .space = *kinds.front().space, .points = *whole, .tau = tau, .allowed = allowed};
   if (thin_rows) {
     found = moved(std::move(found), working.frame(), whole->frame());
-    const std::vector<models::Placed> hidden = moved(search->hidden(), working.frame(), whole->frame());
+    hidden = moved(std::move(hidden), working.frame(), whole->frame());
     if (auto done = swarm::refit(ground, found, search->shares_points(), hidden); !done) return tl::unexpected(done.error());
   }
   result.labels = thin_rows ? std::vector<std::uint16_t>{} : search->labels();
   std::vector<float> corners;
   for (const models::Placed& model : search->found()) corners.push_back(search->corner(*model.space));
+  if (!search->hidden_owns()) hidden.clear();
   search.reset();  // of many points it holds much
-  if (auto done = swarm::settle(ground, found, corners, result); !done) return tl::unexpected(done.error());
+  if (auto done = swarm::settle(ground, found, hidden, corners, result); !done) return tl::unexpected(done.error());
   if (const auto thrown = state_->watch->take()) return fail(Error::Kind::bad_input, *thrown);
   result.backend = backend();
   result.seed = options.seed;

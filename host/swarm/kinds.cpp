@@ -25,9 +25,13 @@ std::vector<Kind> make_kinds(const FitOptions& options) {
   // A flat kind with a prior leaves out what is flat and lies otherwise.
   const bool flat_asked = !options.prior && std::find(asked.begin(), asked.end(), flat) != asked.end();
   const bool doubtful = options.preset == Preset::fast && options.deflation != Deflation::parametric;
-  if (doubtful && !flat_asked && std::any_of(asked.begin(), asked.end(), is_curved)) {
-    kinds.push_back({models::make_space(flat, {}), {}, true});
+  if (!doubtful || std::none_of(asked.begin(), asked.end(), is_curved)) return kinds;
+  if (dimension(options.model) == 3) {
+    for (const ModelType other : {ModelType::cylinder, ModelType::sphere}) {
+      if (std::find(asked.begin(), asked.end(), other) == asked.end()) kinds.push_back({models::make_space(other, {}), {}, true});
+    }
   }
+  if (!flat_asked) kinds.push_back({models::make_space(flat, {}), {}, true});
   return kinds;
 }
 

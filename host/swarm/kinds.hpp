@@ -16,7 +16,7 @@ namespace swarmfit::swarm {
 struct Kind {
   std::unique_ptr<const models::ModelSpace> space;
   Settings settings;    ///< once resolved
-  bool hidden = false;  ///< not asked for; it only takes what is flat from the curved ones
+  bool hidden = false;  ///< not asked for; it only takes from the curved ones what is not theirs
 };
 
 /// A model that a search is given to begin with.
@@ -26,7 +26,8 @@ struct Known {
   std::size_t iterations = 0;  ///< that it took to find
 };
 
-/// Those asked for, in that order, and behind them the flat one that curved kinds are held against, where that was not asked for.
+/// Those asked for, in that order, and behind them those that curved kinds are held against, where they were not asked for: in space the
+/// other curved ones, and last the flat one.
 std::vector<Kind> make_kinds(const FitOptions& options);
 /// Fills their settings in; as resolve() of one.
 void resolve(std::vector<Kind>& kinds, const FitOptions& options, std::size_t finite_points, double threshold);

@@ -234,7 +234,7 @@ bool MultiModel::too_few_left() const {
   if (settings_.deflation == Deflation::parametric || shares_out() || kinds_.size() > 1) return false;
   std::size_t left = 0;
   for (std::size_t i = 0; i < caps_.size(); ++i) left += caps_[i] >= kUnexplained * ground_.allowed_at(i) ? 1 : 0;
-  return static_cast<double>(left) < (may_share() ? kOwnShare : 1.0) * static_cast<double>(settings_.min_inliers);
+  return static_cast<double>(left) < (may_share(0) ? kOwnShare : 1.0) * static_cast<double>(settings_.min_inliers);
 }
 
 bool MultiModel::agree(double saving, double before) const noexcept {
@@ -309,6 +309,9 @@ Expected<MultiModel::Outcome> MultiModel::explore(std::uint32_t round, std::span
   if (!*flown) return Outcome::interrupted;
   candidate.theta = swarm.best();
   candidate.saving = swarm.saving();
+  if (kinds_.size() > 1 && points_.has_normals()) {
+    if (auto done = choose(swarm, candidate); !done) return tl::unexpected(done.error());
+  }
   if (shares_out()) proposals_.insert(proposals_.end(), swarm.own_bests().begin(), swarm.own_bests().end());
   if (auto done = refine(candidate); !done) return tl::unexpected(done.error());
   if (pays(candidate.support, settings, space(candidate.kind).minimal_sample())) return Outcome::found;
@@ -340,14 +343,14 @@ Expected<MultiModel::Outcome> MultiModel::search(const Seeds& seeds, Candidate& 
     auto contested = contest(best);
     if (!contested || *contested != Outcome::unpaid || points_.dimension() != 3) return contested;
     // What seemed to pay is nothing of its own. Something flat may be in the way; else its points are, and the search goes on elsewhere.
-    if (kinds_.back().hidden) {
+    if (hides_flat()) {
       auto flat = look_flat(best, Outcome::unpaid);
       if (!flat || *flat != Outcome::unpaid) return flat;
     }
     best = std::move(rejected);
     return Outcome::rejected;
   }
-  if (kinds_.back().hidden && reached <= Outcome::unpaid) return look_flat(best, reached);
+  if (hides_flat() && reached <= Outcome::unpaid) return look_flat(best, reached);
   return reached;
 }
 
@@ -393,7 +396,8 @@ Expected<> MultiModel::count(Candidate& candidate, std::span<const float> caps, 
   return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
     const std::span<const float> here = caps.subspan(first, distances.size());
     const std::span<const std::uint8_t> beside = std::span(near.beside).subspan(near.beside.empty() ? 0 : first);
-    const std::span<const float> nearest = std::span(near.nearest).subspan(near.nearest.empty() ? 0 : first);
+    const bool shares = may_share(candidate.kind) && !near.nearest.empty();
+    const std::span<const float> nearest = shares ? std::span(near.nearest).subspan(first, distances.size()) : std::span<const float>();
     candidate.support = count_support(levelled(distances, room), levelled(here, caps_room), tau_, beside, candidate.support, nearest);
   });
 }
@@ -421,7 +425,7 @@ Expected<bool> MultiModel::accept(const Candidate& candidate, const ModelCallbac
 
 Expected<> MultiModel::sink(const Candidate& candidate, std::vector<float>& caps, Near& near) const {
   near.beside.resize(points_.size());
-  if (may_share()) near.nearest.resize(points_.size(), std::numeric_limits<float>::infinity());
+  if (any_shares()) near.nearest.resize(points_.size(), std::numeric_limits<float>::infinity());
   std::vector<float> room, reaches;
   const int reach = tail_reach(candidate.support);
   if (lists_distances() && reach > 1 && space(candidate.kind).type() == ModelType::plane) {
@@ -473,13 +477,16 @@ void MultiModel::tell_parameters(FitResult& result) const {
 bool MultiModel::labels_locally() const noexcept { return settings_.sharpen && !part_searched_ && points_.finite_count() <= kFewPoints; }
 
 Expected<> MultiModel::share_out_locally() {
-  auto distances = measure(ground_, found_);
+  std::vector<models::Placed> all = found_;
+  if (hidden_owns()) all.insert(all.end(), hidden_.begin(), hidden_.end());
+  auto distances = measure(ground_, all);
   if (!distances) return tl::unexpected(distances.error());
   std::vector<float> room;
   for (std::vector<float>& one : *distances) {
     if (levelled(one, room).data() == room.data()) one.swap(room);
   }
   labels_ = label_locally(points_, *distances, tau_);
+  forget_beyond(found_.size(), labels_);
   return {};
 }
 

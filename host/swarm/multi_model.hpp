@@ -63,6 +63,8 @@ class MultiModel {
   const std::vector<models::Placed>& found() const noexcept { return found_; }
   /// Flat models that curved ones were taken for; not in the result.
   const std::vector<models::Placed>& hidden() const noexcept { return hidden_; }
+  /// Is what is nearer to one of these nobody's in the result? In the plane all outliers are near some line.
+  bool hidden_owns() const noexcept { return points_.dimension() == 3; }
   /// Has a model no say in what is nearer to another, be it hidden?
   bool shares_points() const noexcept { return asked_ > 1 || !hidden_.empty(); }
   /// Corner of the loss that models of this kind were refined with last, of tau: 0 for the least absolute deviations, 1 for least squares.
@@ -155,9 +157,14 @@ class MultiModel {
   /// visit(first, distances) for runs of points, from the first to the last.
   template <class Visit>
   Expected<> in_runs(const Candidate& candidate, Visit&& visit) const;
-  /// May a model pay with points that a found one explains less well? Few points are labelled with an eye to their neighbours, kinds compete
-  /// for points, and where each point has a threshold of its own the noise's tails are wide.
-  bool may_share() const noexcept { return part_searched_ && kinds_.size() == 1 && allowed_.empty(); }
+  /// May a model of this kind pay with points that a found one explains less well? Few points are labelled with an eye to their
+  /// neighbours, and where each point has a threshold of its own the noise's tails are wide. Of several kinds only what is curved may, in
+  /// space: a plane goes on where its surface ends, and cuts through what is round.
+  bool may_share(std::size_t kind) const noexcept {
+    if (!allowed_.empty()) return false;
+    return kinds_.size() == 1 ? part_searched_ : points_.dimension() == 3 && is_curved(space(kind).type());
+  }
+  bool any_shares() const noexcept { return kinds_.size() == 1 ? may_share(0) : allowed_.empty() && points_.dimension() == 3; }
   /// Do fewer points remain unexplained than a model must have?
   bool too_few_left() const;
   /// Has a swarm in vain come to what the one before it came to?
@@ -180,11 +187,24 @@ class MultiModel {
   double agreement(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
   /// Share of a model's points that lie along it and in the inner half of its slab.
   double gathered(const Candidate& candidate) const;
+  /// The points of a surface have each other for neighbours; what is left here and there of several lies among others' points.
+  /// Share of the neighbours of its points that are its own, times that of the points that lie along it.
+  double held(const Candidate& candidate) const;
+  /// Is a curved model made of what lies here and there?
+  bool is_strewn(const Candidate& candidate) const;
   /// Sum over points of what a model saves, as far as they lie along it [data unit].
   double saving(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
+  /// The same of the part's points, in thresholds.
+  double saving_along(std::size_t kind, const models::Position& theta, std::span<const float> distances) const;
   std::size_t flat_kind(std::size_t curved) const noexcept;
+  /// Is there a flat kind that was not asked for? It is the last.
+  bool hides_flat() const noexcept { return kinds_.back().hidden && !is_curved(kinds_.back().space->type()); }
+  /// Of what the particles of a swarm know, what saves most of the points that lie along it: fitness knows no normals.
+  Expected<> choose(const Swarm& swarm, Candidate& candidate) const;
   /// The winner must stand against the other kinds on its own points.
   Expected<Outcome> contest(Candidate& winner);
+  /// By each curved kind from `first` up to `last`; the better one is the winner then.
+  Expected<> challenge_by(std::size_t first, std::size_t last, Candidate& winner);
   Expected<bool> challenge(const Candidate& winner, Candidate& challenger);
   Expected<bool> best_on(std::size_t kind, std::span<const float> caps, models::Position& theta, std::vector<float>& distances);
   Expected<bool> bends(const Candidate& winner, models::Position& flat);

@@ -44,6 +44,11 @@ void ModelRows::add(const models::ModelSpace& space, const models::Position& the
   views_.push_back({space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
 }
 
+void forget_beyond(std::size_t last, std::span<std::uint16_t> labels) noexcept {
+  std::replace_if(
+      labels.begin(), labels.end(), [&](std::uint16_t label) { return label > last; }, std::uint16_t{0});
+}
+
 void take_nearer(std::span<const float> distances, std::span<float> least) {
   for (std::size_t i = 0; i < least.size(); ++i) least[i] = distances[i] < least[i] ? distances[i] : least[i];
 }

@@ -61,6 +61,9 @@ class ModelRows {
   std::vector<kernels::ModelView> views_;
 };
 
+/// Labels beyond `last` are of models that are not in the result: nobody's.
+void forget_beyond(std::size_t last, std::span<std::uint16_t> labels) noexcept;
+
 /// Where a distance is less, it takes the place of what is there; NaN is less than nothing.
 void take_nearer(std::span<const float> distances, std::span<float> least);
 

@@ -112,18 +112,23 @@ Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool s
   return {};
 }
 
-Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, std::span<const float> corners, FitResult& result) {
+Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, std::span<const models::Placed> hidden,
+                  std::span<const float> corners, FitResult& result) {
   const models::Frame& frame = whole.points.frame();
-  const ModelRows models = rows_of(whole, found);
-  std::vector<kernels::Evidence> evidence(found.size());
+  std::vector<models::Placed> all = found;
+  all.insert(all.end(), hidden.begin(), hidden.end());
+  const ModelRows models = rows_of(whole, all);
+  std::vector<kernels::Evidence> evidence(all.size());
   if (result.labels.empty()) {
     result.labels.resize(whole.points.size());
     const std::span<const float> tolerance = whole.allowed.empty() ? std::span<const float>(&whole.tau, 1) : whole.allowed;
     if (auto done = whole.evaluator.claim(whole.view(), tolerance, models.views(), result.labels, evidence); !done) {
       return tl::unexpected(to_error(done.error()));
     }
-  } else if (auto done = weigh_own(whole, models.views(), result.labels, evidence); !done) {
-    return done;
+    forget_beyond(found.size(), result.labels);
+  } else {
+    evidence.resize(found.size());
+    if (auto done = weigh_own(whole, models.views().first(found.size()), result.labels, evidence); !done) return done;
   }
   for (std::size_t m = 0; m < found.size(); ++m) {
     Model& model = result.models[m];

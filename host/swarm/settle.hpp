@@ -17,8 +17,9 @@ namespace swarmfit::swarm {
 Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool shared, std::span<const models::Placed> hidden);
 
 /// Labels of all points, and for each model of the result its parameters, inliers, rms and covariance. `result` holds a model for each of
-/// `found`, in that order. Where its labels are already one a point, they stay. `corners`: of the
-/// loss that each was refined with, of tau.
-Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, std::span<const float> corners, FitResult& result);
+/// `found`, in that order; what is nearer to one of the `hidden` is nobody's. Where its labels are already one a point, they stay.
+/// `corners`: of the loss that each was refined with, of tau.
+Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, std::span<const models::Placed> hidden,
+                  std::span<const float> corners, FitResult& result);
 
 }  // namespace swarmfit::swarm

@@ -50,6 +50,7 @@ class Swarm {
   std::span<const models::Position> positions() const noexcept { return positions_; }
   std::span<const double> fitness() const noexcept { return fitness_; }
   std::span<const models::Position> own_bests() const noexcept { return own_best_; }
+  std::span<const double> own_fitness() const noexcept { return own_fitness_; }
 
  private:
   void remember();
