@@ -50,6 +50,8 @@ class ModelSpace {
   virtual bool agrees_by_normals() const noexcept { return needs_normals(); }
   /// Whether from_sample takes so long, a microsecond or more, that a swarm's samples are worth spreading over threads.
   virtual bool costly_samples() const noexcept { return false; }
+  /// Length of a curve inside a box of the plane [working frame], by which chance has more points near it; 0 where it does not matter.
+  virtual double length_within(const Position&, const Eigen::Vector2d& /*low*/, const Eigen::Vector2d& /*high*/) const { return 0; }
   /// Degrees of freedom: rank of the covariance.
   virtual int freedom() const noexcept = 0;
 

@@ -29,20 +29,24 @@ Expected<> Landscape::fitness(std::span<const models::Position> positions, std::
   const bool parametric = settings_.deflation == Deflation::parametric;
   parameters_.resize(positions.size() * width);
   factor_.assign(positions.size(), 1.0);
+  by_chance_.assign(positions.size(), 0.0);
   cutoffs_.resize(positions.size());
   costs_.resize(positions.size());
   for (std::size_t j = 0; j < positions.size(); ++j) {
     const models::Position data = space_.to_data(positions[j], frame_);
     std::copy(data.begin(), data.end(), parameters_.begin() + static_cast<std::ptrdiff_t>(j * width));
     if (parametric) factor_[j] = deflation(positions[j]);
+    if (background_.per_length > 0) {
+      by_chance_[j] = background_.per_length * space_.length_within(positions[j], background_.low, background_.high);
+    }
     // Rounded up, so that a fitness just below the best is still told exactly.
-    cutoffs_[j] = std::nextafter(static_cast<float>(bests[j] / factor_[j]), std::numeric_limits<float>::infinity());
+    cutoffs_[j] = std::nextafter(static_cast<float>((bests[j] - by_chance_[j]) / factor_[j]), std::numeric_limits<float>::infinity());
   }
   const kernels::Loss loss = settings_.loss == Loss::truncated_l1 ? kernels::Loss::truncated_l1 : kernels::Loss::truncated_l2;
   if (auto done = evaluator_.evaluate({space_.kind(), positions.size(), parameters_}, loss, cutoffs_, costs_); !done) {
     return tl::unexpected(to_error(done.error()));
   }
-  for (std::size_t j = 0; j < positions.size(); ++j) fitness[j] = static_cast<double>(costs_[j]) * factor_[j];
+  for (std::size_t j = 0; j < positions.size(); ++j) fitness[j] = static_cast<double>(costs_[j]) * factor_[j] + by_chance_[j];
   return {};
 }
 

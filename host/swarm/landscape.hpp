@@ -15,6 +15,12 @@ namespace swarmfit::swarm {
 /// A kernels::Failure in the public words.
 Error to_error(const kernels::Failure& failure);
 
+/// What points strewn evenly over a box save along a curve through it.
+struct Background {
+  double per_length = 0;                  ///< fitness per length in the working frame; 0: chance is not asked
+  Eigen::Vector2d low{0, 0}, high{0, 0};  ///< the box [working frame]
+};
+
 class Landscape {
  public:
   Landscape(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& space, const models::Frame& frame, const Settings& settings)
@@ -22,6 +28,9 @@ class Landscape {
 
   /// Adds a found optimum to O of Eq. (5); without effect on the fitness under residual deflation, whose caps are the evaluator's.
   void deflate_around(const models::Position& optimum) { optima_.push_back(optimum); }
+
+  /// From now on a fitness tells what a model saves beyond chance: without that a wide circle among outliers is as good as a small true one.
+  void expect(const Background& background) { background_ = background; }
 
   /// fitness[j] of positions[j], exact where it is below bests[j]. Sizes must be equal.
   Expected<> fitness(std::span<const models::Position> positions, std::span<const double> bests, std::span<double> fitness);
@@ -35,8 +44,9 @@ class Landscape {
   const models::ModelSpace& space_;
   const models::Frame& frame_;
   const Settings& settings_;
+  Background background_;
   std::vector<models::Position> optima_;
-  std::vector<double> parameters_, factor_;
+  std::vector<double> parameters_, factor_, by_chance_;
   std::vector<float> cutoffs_, costs_;
 };
 

@@ -20,6 +20,7 @@ namespace {
 
 constexpr double kStable = 0.01;                    // spread of the list of global bests, as a share of the scale, below which it is stable
 constexpr double kAlike = 0.02;                     // share of their saving by which the bests of two swarms that found the same may differ
+constexpr double kByChance = 1.0;                   // share of the unexplained points that are taken for strewn evenly
 constexpr int kFullRounds = 1;                      // of refinement on all points, where it was done on a part of them before
 constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
 
@@ -255,6 +256,24 @@ double MultiModel::loss_of_nothing(std::span<const float> caps) const {
   return sum_of(part_searched_ ? std::span<const float>(part_caps_) : caps);
 }
 
+Background MultiModel::background(std::size_t kind, std::span<const float> caps) const {
+  if (space(kind).type() != ModelType::circle2d) return {};
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  Background evenly{0, {kLargest, kLargest}, {-kLargest, -kLargest}};
+  double square = 0;
+  for (std::size_t i = 0; i < caps.size(); ++i) {
+    if (!points_.finite(i)) continue;
+    const Eigen::Vector2d p = points_.point<2>(i);
+    evenly.low = evenly.low.cwiseMin(p);
+    evenly.high = evenly.high.cwiseMax(p);
+    square += static_cast<double>(caps[i]) * static_cast<double>(caps[i]);
+  }
+  // A point d from the curve saves c - d: the square of its cap in all, on both sides, over the area.
+  const double area = (evenly.high - evenly.low).prod() * points_.frame().scale;
+  if (area > 0 && !part_searched_) evenly.per_length = kByChance * square / area;
+  return evenly;
+}
+
 Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
                                std::span<const float> caps, float alive) {
   // Normals bring neighbourhoods that are too close for a kind which has no use for them.
@@ -264,6 +283,7 @@ Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t rou
   sampler.prefer_unexplained(levelled(caps, room), alive);
   scale_ = loss_of_nothing(caps);
   swarm.share_work(evaluator_);
+  if (settings_.deflation == Deflation::residual) landscapes_[kind].expect(background(kind, caps));
   if (!swarm.start(sampler, round, seeds)) {
     stop_reason_ = "complete: what is left determines no model";
     return false;

@@ -165,6 +165,8 @@ class MultiModel {
     return kinds_.size() == 1 ? part_searched_ : points_.dimension() == 3 && is_curved(space(kind).type());
   }
   bool any_shares() const noexcept { return kinds_.size() == 1 ? may_share(0) : allowed_.empty() && points_.dimension() == 3; }
+  /// What chance would save along the models of a kind, under these caps.
+  Background background(std::size_t kind, std::span<const float> caps) const;
   /// Do fewer points remain unexplained than a model must have?
   bool too_few_left() const;
   /// Has a swarm in vain come to what the one before it came to?
