@@ -20,7 +20,6 @@ namespace {
 
 constexpr double kStable = 0.01;                    // spread of the list of global bests, as a share of the scale, below which it is stable
 constexpr double kAlike = 0.02;                     // share of their saving by which the bests of two swarms that found the same may differ
-constexpr double kByChance = 1.0;                   // share of the unexplained points that are taken for strewn evenly
 constexpr int kFullRounds = 1;                      // of refinement on all points, where it was done on a part of them before
 constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
 
@@ -257,7 +256,7 @@ double MultiModel::loss_of_nothing(std::span<const float> caps) const {
 }
 
 Background MultiModel::background(std::size_t kind, std::span<const float> caps) const {
-  if (space(kind).type() != ModelType::circle2d) return {};
+  if (space(kind).type() != ModelType::circle2d || part_searched_) return {};
   constexpr double kLargest = std::numeric_limits<double>::max();
   Background evenly{0, {kLargest, kLargest}, {-kLargest, -kLargest}};
   double square = 0;
@@ -270,7 +269,7 @@ Background MultiModel::background(std::size_t kind, std::span<const float> caps)
   }
   // A point d from the curve saves c - d: the square of its cap in all, on both sides, over the area.
   const double area = (evenly.high - evenly.low).prod() * points_.frame().scale;
-  if (area > 0 && !part_searched_) evenly.per_length = kByChance * square / area;
+  if (area > 0) evenly.per_length = square / area;
   return evenly;
 }
 

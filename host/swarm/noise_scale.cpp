@@ -14,18 +14,18 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kSigmas = 2.5;     // 98.8 % of a Gaussian lie within
-constexpr double kReach = 3;        // thresholds: how far about the models points tell the noise from what surrounds it
-constexpr double kGenerous = 0.08;  // first threshold, in units of the cloud's own spread
-constexpr double kLeast = 1e-6;     // no threshold below this, in the same units: float coordinates carry no more
-constexpr double kSettled = 0.05;   // relative change of the threshold below which it stays
-constexpr double kAlike = 0.25;     // one below which a search would find the same models
-constexpr int kFreeSteps = 2;       // of the threshold; further ones go half the way, for it may swing between two models' noise
-constexpr int kRounds = 10;         // of search
-constexpr int kSteps = 10;          // of models and threshold in turn, after each
-constexpr double kWidest = 0.25;    // of the cloud's width: a slab that has half the cloud within it tells no noise
-constexpr double kWidened = 2;      // times what a search started with: it went the wrong way, or started far too narrow
-constexpr double kDoubt = 1.5;
+constexpr double kSigmas = 2.5;          // 98.8 % of a Gaussian lie within
+constexpr double kReach = 3;             // thresholds: how far about the models points tell the noise from what surrounds it
+constexpr double kGenerous = 0.08;       // first threshold, in units of the cloud's own spread
+constexpr double kLeast = 1e-6;          // no threshold below this, in the same units: float coordinates carry no more
+constexpr double kSettled = 0.05;        // relative change of the threshold below which it stays
+constexpr double kAlike = 0.25;          // one below which a search would find the same models
+constexpr int kFreeSteps = 2;            // of the threshold; further ones go half the way, for it may swing between two models' noise
+constexpr int kRounds = 10;              // of search
+constexpr int kSteps = 10;               // of models and threshold in turn, after each
+constexpr double kWidest = 0.25;         // of the cloud's width: a slab that has half the cloud within it tells no noise
+constexpr double kWidened = 2;           // times what a search started with: it went the wrong way, or started far too narrow
+constexpr double kDoubt = 1.5;           // times as significant as another must such a one be
 constexpr int kStarts = 3;               // thresholds that a search may start with, each half the one before
 constexpr std::size_t kModels = 4;       // the most prominent ones tell the scale
 constexpr std::size_t kFirstModels = 2;  // at first, when the scale is not known

@@ -94,8 +94,9 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
                                      kernels::FitnessEvaluator* workers) {
   const std::size_t n = points.finite_count(), runs = std::min(n, size);
   std::vector<std::uint32_t> drawn(runs);
+  if (runs == 0) return drawn;
   // Run k begins at floor(n k / runs).
-  const std::size_t whole = runs > 0 ? n / runs : 0, rest = runs > 0 ? n % runs : 0;
+  const std::size_t whole = n / runs, rest = n % runs;
   // Where runs are short half a word tells a point: as even as one can see, for half the random numbers.
   constexpr std::size_t kShort = 1024;
   const bool halves = whole < kShort;
@@ -103,7 +104,7 @@ std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const 
   share(workers, runs, [&](std::size_t first, std::size_t end) {
     models::FiniteWalk walk = points.walk();
     std::array<std::uint32_t, 8> words{};
-    std::size_t from = whole * first + rest * first / std::max<std::size_t>(runs, 1), over = rest * first % std::max<std::size_t>(runs, 1);
+    std::size_t from = whole * first + rest * first / runs, over = rest * first % runs;
     auto block = static_cast<std::uint32_t>(first / at_once);
     for (std::size_t k = first; k < end; ++block) {
       const auto four = runs < n ? random.words(Draw::subset, number, 0, block) : std::array<std::uint32_t, 4>{};
