@@ -30,11 +30,19 @@ struct SlabsView {
 /// Adds to the counts.
 void count_slabs(const SlabsView& view, SlabCounts& counts);
 
-/// What a found model leaves of the points it explains. For those less than `reach` away marks[i] = 1; others[i], if there are any, is the
-/// less of itself and the distance; caps[i] is at most slope (distance - level), and at least 0. NaN changes nothing.
+/// How a found model sinks what it explains. Widths and reaches are one for all points, or one a point.
 struct Sinking {
-  float reach = 0, level = 0, slope = 0;
+  float width = 0;                      ///< of a slab, > 0 [unit of the distances]
+  std::span<const float> widths = {};   ///< empty, or that of each point
+  float reach = 0;                      ///< slabs of which nothing is left
+  std::span<const float> reaches = {};  ///< empty, or those of each point
+  float slope = 0;                      ///< of what is left beyond them
+  float marked = 0;                     ///< slabs of which points are marked
 };
+
+/// What a found model leaves of the points. caps[i] is at most slope (distance - reach_i width_i), and at least 0; marks[i] = 1 where the
+/// distance is less than `marked` slabs; others[i] is at most the distance in measures that make the width of each point `width`. Marks and
+/// others may be empty. NaN changes nothing.
 void sink(std::span<const float> distances, const Sinking& how, std::span<std::uint8_t> marks, std::span<float> others,
           std::span<float> caps);
 

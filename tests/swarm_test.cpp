@@ -215,7 +215,8 @@ TEST(Deflation, TakesAllWithinReachAndNothingWellBeyond) {
   const float tau = 0.1F;
   const std::vector<float> distances{0.0F, 0.09F, 0.12F, 0.5F, std::nanf("")};
   std::vector<float> caps{0.1F, 0.1F, 0.1F, 0.05F, 0.0F};
-  deflate(distances, tau, 1, 2.0, caps);
+  Near nowhere;
+  deflate(distances, {.tau = tau, .slope = 2.0}, 0, caps, nowhere);
   EXPECT_FLOAT_EQ(caps[0], 0.0F);
   EXPECT_FLOAT_EQ(caps[1], 0.0F);
   EXPECT_NEAR(caps[2], 0.04F, 1e-6F);
@@ -262,7 +263,8 @@ TEST(Deflation, ReachIsOneWhereThePlaneHasNoPointsOfItsOwn) {
   EXPECT_LE(ones(0, 4000), 80) << "the floor's tail, but for its rim";
   EXPECT_GE(ones(4000, 4400), 300) << "the step";
   std::vector<float> left = caps;
-  deflate(distances, kTau, 2, 2.0, left, {}, reach);
+  Near nowhere;
+  deflate(distances, {.tau = kTau, .reach = 2, .reaches = reach, .slope = 2.0}, 0, left, nowhere);
   EXPECT_EQ(left[0], 0.0F);
   for (std::size_t i = 4000; i < left.size(); ++i) EXPECT_NEAR(left[i], reach[i] == 1 ? 0.1F : 0.0F, 1e-6F) << i;
 }
@@ -315,9 +317,10 @@ TEST(Payment, TwoSurfacesSideBySidePayUnlessOneIsTheOthersLayer) {
   twin.beside = 100;
   EXPECT_FALSE(pays(twin, settings, 2)) << "beside what has been found";
   const std::vector<float> distances{0.01F, 0.04F, 0.06F, 0.2F}, caps(4, 0.1F), found{0.5F, 0.8F, 0.1F, 0.1F};
-  std::vector<std::uint8_t> beside(4);
-  mark_beside(found, 0.1F, beside);
-  const Support s = count_support(distances, caps, 0.1F, beside);
+  Near near{.beside = std::vector<std::uint8_t>(4)};
+  std::vector<float> left = caps;
+  deflate(found, {.tau = 0.1F, .slope = 2.0}, 0, left, near);
+  const Support s = count_support(distances, caps, 0.1F, near.beside);
   EXPECT_EQ(s.inner, 2U);
   EXPECT_EQ(s.beside, 2U) << "of the first slab, those less than seven tau from a found model";
 }

@@ -82,19 +82,35 @@ TEST_P(Tallies, SlabsAreCountedAsByAPlainLoop) {
   }
 }
 
+void sink_plainly(const Sinking& how, bool marks, bool others, Values& v) {
+  for (std::size_t i = 0; i < v.distances.size(); ++i) {
+    const float d = v.distances[i], width = how.widths.empty() ? how.width : how.widths[i];
+    const float levelled = how.widths.empty() ? d : d * (how.width / width);
+    const float left = how.slope * (d - (how.reaches.empty() ? how.reach : how.reaches[i]) * width);
+    if (marks && levelled < how.marked * how.width) v.marks[i] = 1;
+    if (others && levelled < v.others[i]) v.others[i] = levelled;
+    if (left < v.caps[i]) v.caps[i] = std::max(left, 0.0F);
+  }
+}
+
 TEST_P(Tallies, WhatAFoundModelLeavesIsThatOfAPlainLoop) {
-  const Sinking how{7 * kWidth, 2 * kWidth, 0.5F};
   for (const std::size_t n : {0, 1, 15, 16, 17, 5003}) {
-    for (const bool with_others : {false, true}) {
-      SCOPED_TRACE(n);
-      Values exact = make_values(n), found = exact;
-      for (std::size_t i = 0; i < n; ++i) {
-        const float d = exact.distances[i], left = how.slope * (d - how.level);
-        if (d < how.reach) exact.marks[i] = 1;
-        if (with_others && d < exact.others[i]) exact.others[i] = d;
-        if (left < exact.caps[i]) exact.caps[i] = std::max(left, 0.0F);
-      }
-      GetParam()->sink(found.distances, how, found.marks.data(), with_others ? found.others.data() : nullptr, found.caps.data());
+    const Values values = make_values(n);
+    std::vector<float> widths, reaches;
+    for (std::size_t i = 0; i < n; ++i) {
+      widths.push_back(kWidth * static_cast<float>(1 + i % 7));
+      reaches.push_back(static_cast<float>(1 + i % 3));
+    }
+    for (unsigned with = 0; with < 16; ++with) {
+      SCOPED_TRACE(testing::Message() << n << " points, lists " << with);
+      const bool marks = with & 1, others = with & 2;
+      Sinking how{.width = kWidth, .reach = 2, .slope = 0.5F, .marked = 7};
+      if (with & 4) how.widths = widths;
+      if (with & 8) how.reaches = reaches;
+      Values exact = values, found = values;
+      sink_plainly(how, marks, others, exact);
+      GetParam()->sink(found.distances, how, marks ? found.marks.data() : nullptr, others ? found.others.data() : nullptr,
+                       found.caps.data());
       EXPECT_EQ(found.marks, exact.marks);
       EXPECT_EQ(found.others, exact.others);
       EXPECT_EQ(found.caps, exact.caps);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 
 #include <Eigen/Geometry>
 
@@ -121,28 +119,16 @@ std::vector<float> local_reach(const models::WorkingPoints& points, const Eigen:
   return reaches;
 }
 
-void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps, std::span<const float> allowed,
-             std::span<const float> reaches) {
-  const auto steep = static_cast<float>(slope);
-  if (!reaches.empty()) {
-    for (std::size_t i = 0; i < caps.size(); ++i) {
-      const float left = steep * (distances[i] - reaches[i] * (allowed.empty() ? tau : allowed[i]));
-      caps[i] = left < caps[i] ? std::max(left, 0.0F) : caps[i];
-    }
-    return;
-  }
-  if (!allowed.empty()) {
-    for (std::size_t i = 0; i < caps.size(); ++i) {
-      const float left = steep * (distances[i] - static_cast<float>(reach) * allowed[i]);
-      caps[i] = left < caps[i] ? std::max(left, 0.0F) : caps[i];
-    }
-    return;
-  }
-  const float width = static_cast<float>(reach) * tau;
-  for (std::size_t i = 0; i < caps.size(); ++i) {
-    const float left = steep * (distances[i] - width);
-    caps[i] = left < caps[i] ? (left > 0 ? left : 0.0F) : caps[i];
-  }
+void deflate(std::span<const float> distances, const DeadZone& zone, std::size_t first, std::span<float> caps, Near& near) {
+  const auto here = [&]<class T>(std::span<T> all) { return all.empty() ? all : all.subspan(first, distances.size()); };
+  kernels::Sinking how;
+  how.width = zone.tau;
+  how.widths = here(zone.allowed);
+  how.reach = static_cast<float>(zone.reach);
+  how.reaches = here(std::span<const float>(zone.reaches));
+  how.slope = static_cast<float>(zone.slope);
+  how.marked = static_cast<float>(Support::kSlabs);
+  kernels::sink(distances, how, here(std::span(near.beside)), here(std::span(near.nearest)), here(caps));
 }
 
 }  // namespace swarmfit::swarm

@@ -1,6 +1,8 @@
 // Residual deflation: what a found model explains sinks out of the landscape, and only that.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -20,9 +22,24 @@ int tail_reach(const Support& support);
 std::vector<float> local_reach(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
                                std::span<const float> caps, float tau, int reach);
 
+/// Where points are beside what has been found.
+struct Near {
+  std::vector<std::uint8_t> beside = {};  ///< one a point: is it less than kSlabs tau_i from a found model? Empty until there is one
+  std::vector<float> nearest = {};  ///< one a point, where points may be shared: how far the nearest found model is, where tau_i is tau
+};
+
+/// What a found model takes with it.
+struct DeadZone {
+  float tau = 0;                        ///< [data unit]
+  std::span<const float> allowed = {};  ///< tau_i, one a point, or empty where it is tau for all
+  int reach = 1;                        ///< how far from the model nothing is left [tau_i]
+  std::vector<float> reaches = {};      ///< that of each point, or empty
+  double slope = 0;
+};
+
 /// c_i <- min(c_i, max(0, slope (|dist_i| - reach tau_i))): nothing is left of points within reach, all of those well beyond it.
-/// NaN distances change nothing. `reaches`: reach of each point, or empty. `allowed`: tau_i, one a point, or empty where it is tau for all.
-void deflate(std::span<const float> distances, float tau, int reach, double slope, std::span<float> caps,
-             std::span<const float> allowed = {}, std::span<const float> reaches = {});
+/// `distances` are of a run of points, from `first` on; NaN changes nothing. Of these points `near` learns where the model is, in those of
+/// its lists that are not empty.
+void deflate(std::span<const float> distances, const DeadZone& zone, std::size_t first, std::span<float> caps, Near& near);
 
 }  // namespace swarmfit::swarm

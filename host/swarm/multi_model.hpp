@@ -10,6 +10,7 @@
 #include <swarmfit/fit.hpp>
 
 #include "host/models/model_space.hpp"
+#include "host/swarm/deflation.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/payment.hpp"
@@ -43,6 +44,8 @@ struct Watch {
   std::size_t swarms = 0;  ///< flown so far, of whatever purpose
 };
 
+/// One fit's search. The loop is in multi_model.cpp; one search in search.cpp, how its outcome is judged in candidates.cpp, how kinds
+/// compete in contest.cpp; the joint end in polish.cpp and, where models share their points out, in share_out.cpp.
 class MultiModel {
  public:
   /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are drawn
@@ -95,6 +98,7 @@ class MultiModel {
   Expected<bool> fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
                      std::span<const float> caps, float alive);
   Expected<> watched_step(Swarm& swarm, std::size_t kind, const Sampler& sampler);
+  Seeds seeds_from(const std::vector<Model>& warm_start) const;
   /// Takes a model without a search, if it pays.
   Expected<> adopt(const Known& known, const ModelCallback& on_model, FitResult& result);
   /// What follows once a search has come to a model, be it a hidden one.
@@ -102,13 +106,9 @@ class MultiModel {
   Expected<> refine(Candidate& candidate);
   /// So many rounds of refinement on all points; distances, loss and support of what comes of it.
   Expected<> look(Candidate& candidate, int rounds);
-  /// Where points are beside what has been found.
-  struct Near {
-    std::vector<std::uint8_t> beside;  ///< one a point: is it beside a found model? Empty until there is one
-    std::vector<float> nearest;        ///< one a point, where points may be shared: how far the nearest found model is
-  };
   /// The candidate's support, by its distances.
   Expected<> count(Candidate& candidate, std::span<const float> caps, const Near& near) const;
+  DeadZone dead_zone(const Candidate& candidate, std::span<const float> caps) const;
   /// What the candidate explains sinks out of the caps.
   Expected<> sink(const Candidate& candidate, std::vector<float>& caps, Near& near) const;
   /// Where a plane that was found runs across two surfaces, one of these takes its place; the other is what is returned.
@@ -116,6 +116,8 @@ class MultiModel {
   Expected<> take_found(Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<bool> accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate(const Candidate& candidate);
+  /// The points of a candidate that was rejected are left as they are from now on; it is no neighbour of theirs.
+  Expected<> set_aside(const Candidate& candidate);
   Expected<> finish(FitResult& result);
   /// Each model refined on what the others leave it, as far as that does not raise the energy of all.
   Expected<> polish();

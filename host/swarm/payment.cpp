@@ -14,11 +14,6 @@ double saved(std::span<const float> caps, std::span<const float> distances) {
   return sum;
 }
 
-void mark_beside(std::span<const float> distances, float tau, std::span<std::uint8_t> beside) {
-  const float reach = beside_reach(tau);
-  for (std::size_t i = 0; i < beside.size(); ++i) beside[i] |= distances[i] < reach ? 1 : 0;
-}
-
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside,
                       const Support& before, std::span<const float> nearest) {
   kernels::SlabCounts counts;

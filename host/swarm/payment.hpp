@@ -36,14 +36,10 @@ inline constexpr double kOwnShare = 0.8;
 /// What a model at these distances saves of what the points may cost, in the caps' unit. NaN saves nothing.
 double saved(std::span<const float> caps, std::span<const float> distances);
 
-/// NaN distances count for nothing. `beside` is empty or one a point, as by mark_beside(); `before` is of the points that come before these;
-/// `nearest` is empty, and no point is shared, or one a point: how far the nearest found model is.
+/// NaN distances count for nothing. `beside` and `nearest` are empty or one a point, as in Near (deflation.hpp), and without `nearest` no point
+/// is shared; `before` is of the points that come before these.
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside = {},
                       const Support& before = {}, std::span<const float> nearest = {});
-
-/// Marks, with 1, points less than kSlabs tau from a model that was found. NaN is not.
-void mark_beside(std::span<const float> distances, float tau, std::span<std::uint8_t> beside);
-inline constexpr float beside_reach(float tau) noexcept { return static_cast<float>(Support::kSlabs) * tau; }
 
 /// Logarithm of the expected number of models as good as this among the surroundings' points (a-contrario; Chernoff's bound on the
 /// binomial tail, background density from the band or from all slabs beyond the first, whichever is denser, one test for each minimal

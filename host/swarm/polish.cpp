@@ -1,8 +1,9 @@
-// The joint end of models that share no points: each refined on what the others leave it.
+// The joint end: each model refined on what the others leave it, what no longer pays dropped.
 #include <algorithm>
 #include <numeric>
 #include <utility>
 
+#include "host/swarm/local_labels.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/refinement.hpp"
 
@@ -28,6 +29,57 @@ std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float
 }
 
 }  // namespace
+
+Expected<> MultiModel::finish(FitResult& result) {
+  if (settings_.joint && !limits_.stop.stop_requested() && (!found_.empty() || (shares_out() && !full()))) {
+    if (auto done = polish(); !done) return done;
+    if (shares_out()) return share_out(result);
+    // With many points the polished models are where the joint refit would leave them.
+    if (!part_searched_) {
+      if (auto energy = refine_jointly(ground_, found_); !energy) return tl::unexpected(energy.error());
+    }
+    if (auto done = drop_unpaid(result); !done) return done;
+    tell_parameters(result);
+    if (labels_locally()) {
+      if (auto done = share_out_locally(); !done) return done;
+    }
+  }
+  count_effort(result);
+  return {};
+}
+
+void MultiModel::tell_parameters(FitResult& result) const {
+  for (std::size_t m = 0; m < found_.size(); ++m) result.models[m].parameters = found_[m].space->to_data(found_[m].theta, points_.frame());
+}
+
+bool MultiModel::labels_locally() const noexcept { return settings_.sharpen && !part_searched_ && points_.finite_count() <= kFewPoints; }
+
+Expected<> MultiModel::share_out_locally() {
+  std::vector<models::Placed> all = found_;
+  if (hidden_owns()) all.insert(all.end(), hidden_.begin(), hidden_.end());
+  auto distances = measure(ground_, all);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<float> room;
+  for (std::vector<float>& one : *distances) {
+    if (levelled(one, room).data() == room.data()) one.swap(room);
+  }
+  labels_ = label_locally(points_, *distances, tau_);
+  forget_beyond(found_.size(), labels_);
+  return {};
+}
+
+Expected<> MultiModel::drop_unpaid(FitResult& result) {
+  while (found_.size() > 1) {
+    auto unique = unique_support(ground_, found_);
+    if (!unique) return tl::unexpected(unique.error());
+    const auto least = std::min_element(unique->begin(), unique->end());
+    if (2 * *least >= settings_.min_inliers) return {};
+    found_.erase(found_.begin() + (least - unique->begin()));
+    result.models.erase(result.models.begin() + (least - unique->begin()));
+    if (auto energy = refine_jointly(ground_, found_, full_rounds()); !energy) return tl::unexpected(energy.error());
+  }
+  return {};
+}
 
 bool MultiModel::sharpens(const models::ModelSpace& of) const noexcept {
   const bool asked = settings_.joint && settings_.sharpen && !is_curved(of.type()) && settings_.loss == Loss::truncated_l1;

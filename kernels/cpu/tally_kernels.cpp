@@ -129,42 +129,82 @@ void count_slabs(const SlabsView& view, SlabCounts& counts) {
   lanes.finish(counts);
 }
 
-struct SinkVectors {
-  Vector reach, level, slope;
+/// One value for all points, or where there is a list one a point.
+class Each {
+ public:
+  HWY_INLINE Each(float all, std::span<const float> each) : all_(hn::Set(FloatTag(), all)), each_(each.empty() ? nullptr : each.data()) {}
+  HWY_INLINE bool differs() const { return each_ != nullptr; }
+  HWY_INLINE Vector at(std::size_t i) const { return each_ != nullptr ? hn::LoadU(FloatTag(), each_ + i) : all_; }
+
+ private:
+  Vector all_;
+  const float* each_;
 };
 
-HWY_INLINE void sink_vector(const SinkVectors& how, const float* distances, std::uint8_t* marks, float* others, float* caps) {
-  const FloatTag d;
-  const Vector distance = hn::LoadU(d, distances);
-  const auto mark = hn::DemoteTo(ByteTag(), ones_where(hn::Lt(distance, how.reach)));
-  hn::StoreU(hn::Or(hn::LoadU(ByteTag(), marks), mark), ByteTag(), marks);
-  if (others != nullptr) {
-    const Vector before = hn::LoadU(d, others);
-    hn::StoreU(hn::IfThenElse(hn::Lt(distance, before), distance, before), d, others);
+class Sinker {
+ public:
+  HWY_INLINE explicit Sinker(const Sinking& how)
+      : widths_(how.width, how.widths),
+        reaches_(how.reach, how.reaches),
+        slope_(hn::Set(FloatTag(), how.slope)),
+        width_(hn::Set(FloatTag(), how.width)),
+        marked_(hn::Set(FloatTag(), how.marked * how.width)) {}
+
+  /// `marks` and `others` may be null.
+  HWY_INLINE void sink(std::size_t i, const float* distances, std::uint8_t* marks, float* others, float* caps) const {
+    const FloatTag d;
+    const Vector distance = hn::LoadU(d, distances), width = widths_.at(i);
+    if (marks != nullptr || others != nullptr)
+      mark(widths_.differs() ? hn::Mul(distance, hn::Div(width_, width)) : distance, marks, others);
+    const Vector cap = hn::LoadU(d, caps), left = hn::Mul(slope_, hn::Sub(distance, hn::Mul(reaches_.at(i), width)));
+    const Vector less = hn::IfThenElseZero(hn::Gt(left, hn::Zero(d)), left);
+    hn::StoreU(hn::IfThenElse(hn::Lt(left, cap), less, cap), d, caps);
   }
-  const Vector cap = hn::LoadU(d, caps), left = hn::Mul(how.slope, hn::Sub(distance, how.level));
-  const Vector less = hn::IfThenElseZero(hn::Gt(left, hn::Zero(d)), left);
-  hn::StoreU(hn::IfThenElse(hn::Lt(left, cap), less, cap), d, caps);
-}
+
+ private:
+  HWY_INLINE void mark(Vector levelled, std::uint8_t* marks, float* others) const {
+    const FloatTag d;
+    if (marks != nullptr) {
+      const auto here = hn::DemoteTo(ByteTag(), ones_where(hn::Lt(levelled, marked_)));
+      hn::StoreU(hn::Or(hn::LoadU(ByteTag(), marks), here), ByteTag(), marks);
+    }
+    if (others != nullptr) {
+      const Vector before = hn::LoadU(d, others);
+      hn::StoreU(hn::IfThenElse(hn::Lt(levelled, before), levelled, before), d, others);
+    }
+  }
+
+  Each widths_, reaches_;
+  Vector slope_, width_, marked_;
+};
 
 void sink(std::span<const float> distances, const Sinking& how, std::uint8_t* marks, float* others, float* caps) {
-  const FloatTag d;
-  const SinkVectors vectors{hn::Set(d, how.reach), hn::Set(d, how.level), hn::Set(d, how.slope)};
+  const Sinker sinker(how);
   const std::size_t n = distances.size(), whole = n - n % kLanes;
   for (std::size_t i = 0; i < whole; i += kLanes) {
-    sink_vector(vectors, distances.data() + i, marks + i, others != nullptr ? others + i : nullptr, caps + i);
+    sinker.sink(i, distances.data() + i, marks != nullptr ? marks + i : nullptr, others != nullptr ? others + i : nullptr, caps + i);
   }
   if (whole == n) return;
-  HWY_ALIGN float last_distances[kLanes] = {}, last_caps[kLanes] = {}, last_others[kLanes] = {};
+  HWY_ALIGN float last_distances[kLanes] = {}, last_caps[kLanes] = {}, last_others[kLanes] = {}, last_widths[kLanes], last_reaches[kLanes];
   HWY_ALIGN std::uint8_t last_marks[kLanes] = {};
-  std::copy(distances.begin() + static_cast<std::ptrdiff_t>(whole), distances.end(), last_distances);
-  std::copy(caps + whole, caps + n, last_caps);
-  std::copy(marks + whole, marks + n, last_marks);
-  if (others != nullptr) std::copy(others + whole, others + n, last_others);
-  sink_vector(vectors, last_distances, last_marks, others != nullptr ? last_others : nullptr, last_caps);
-  std::copy(last_caps, last_caps + (n - whole), caps + whole);
-  std::copy(last_marks, last_marks + (n - whole), marks + whole);
-  if (others != nullptr) std::copy(last_others, last_others + (n - whole), others + whole);
+  const std::size_t rest = n - whole;
+  std::copy_n(distances.data() + whole, rest, last_distances);
+  std::copy_n(caps + whole, rest, last_caps);
+  if (marks != nullptr) std::copy_n(marks + whole, rest, last_marks);
+  if (others != nullptr) std::copy_n(others + whole, rest, last_others);
+  Sinking last = how;
+  const auto take_last = [&](std::span<const float>& each, float all, float* room) {
+    std::fill_n(room, kLanes, all);
+    if (each.empty()) return;
+    std::copy_n(each.data() + whole, rest, room);
+    each = std::span<const float>(room, kLanes);
+  };
+  take_last(last.widths, how.width, last_widths);
+  take_last(last.reaches, how.reach, last_reaches);
+  Sinker(last).sink(0, last_distances, marks != nullptr ? last_marks : nullptr, others != nullptr ? last_others : nullptr, last_caps);
+  std::copy_n(last_caps, rest, caps + whole);
+  if (marks != nullptr) std::copy_n(last_marks, rest, marks + whole);
+  if (others != nullptr) std::copy_n(last_others, rest, others + whole);
 }
 
 const TallyKernels& tally_kernels() {
@@ -195,7 +235,8 @@ void count_slabs(const SlabsView& view, SlabCounts& counts) { cpu::available_tal
 
 void sink(std::span<const float> distances, const Sinking& how, std::span<std::uint8_t> marks, std::span<float> others,
           std::span<float> caps) {
-  cpu::available_tally_kernels().front()->sink(distances, how, marks.data(), others.empty() ? nullptr : others.data(), caps.data());
+  cpu::available_tally_kernels().front()->sink(distances, how, marks.empty() ? nullptr : marks.data(),
+                                               others.empty() ? nullptr : others.data(), caps.data());
 }
 
 }  // namespace swarmfit::kernels

@@ -12,7 +12,7 @@ namespace swarmfit::kernels::cpu {
 struct TallyKernels {
   const char* name;
   void (*count_slabs)(const SlabsView& view, SlabCounts& counts);
-  /// `others` may be null.
+  /// `marks` and `others` may be null.
   void (*sink)(std::span<const float> distances, const Sinking& how, std::uint8_t* marks, float* others, float* caps);
 };
 
