@@ -4,6 +4,7 @@
 #include <numeric>
 #include <utility>
 
+#include "kernels/bit_spread.hpp"
 #include "kernels/cpu/tasks.hpp"
 
 namespace swarmfit::kernels {
@@ -27,19 +28,6 @@ std::pair<float, float> bulk(const float* column, std::size_t count) {
   return {low - margin, high + margin};
 }
 
-/// Bits of v spread out so that `gap` zero bits follow each.
-std::uint32_t spread_bits(std::uint32_t v, int gap, int bits) {
-  std::uint32_t out = 0;
-  for (int b = 0; b < bits; ++b) out |= ((v >> b) & 1U) << (b * (gap + 1));
-  return out;
-}
-
-/// spread_bits for every cell number of an axis.
-std::vector<std::uint32_t> spread_table(int dimensions, int bits) {
-  std::vector<std::uint32_t> table(std::size_t{1} << bits);
-  for (std::size_t v = 0; v < table.size(); ++v) table[v] = spread_bits(static_cast<std::uint32_t>(v), dimensions - 1, bits);
-  return table;
-}
 
 /// The list in chunks of rows, fixed by its length alone.
 struct Chunks {
@@ -81,12 +69,12 @@ void MortonOrder::sort(std::span<const float* const> columns, std::size_t count,
   const int bits = kKeyBits / static_cast<int>(dimensions);
   const auto most = static_cast<float>((std::size_t{1} << bits) - 1);
   const auto scale = static_cast<float>(widest > 0 ? static_cast<double>(most) / widest : 0.0);
-  const std::vector<std::uint32_t> spread = spread_table(static_cast<int>(dimensions), bits);
+  const BitSpread spread(static_cast<int>(dimensions));
   const auto key = [&](std::size_t i) {
     std::uint32_t whole = 0;
     for (std::size_t c = 0; c < dimensions; ++c) {
       const float cell = std::min(std::max(0.0F, (columns[c][i] - low[c]) * scale), most);  // NaN, of infinities, becomes 0
-      whole |= spread[static_cast<std::size_t>(static_cast<std::int32_t>(cell))] << c;
+      whole |= static_cast<std::uint32_t>(spread(static_cast<std::uint32_t>(static_cast<std::int32_t>(cell)))) << c;
     }
     return whole;
   };

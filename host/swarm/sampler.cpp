@@ -24,11 +24,15 @@ Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint3
 }
 
 bool Sampler::leave_out(std::span<const float> values, float least, std::size_t enough) {
-  live_.clear();
+  live_.resize(candidates_.size());
+  std::size_t kept = 0;
   for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
-    alive_[place] = values[candidates_[place]] >= least ? 1 : 0;
-    if (alive_[place] != 0) live_.push_back(place);
+    const bool alive = values[candidates_[place]] >= least;
+    alive_[place] = alive ? 1 : 0;
+    live_[kept] = place;  // overwritten by the next if it is not alive
+    kept += alive ? 1 : 0;
   }
+  live_.resize(kept);
   if (live_.size() >= enough) return true;
   live_.resize(candidates_.size());
   std::iota(live_.begin(), live_.end(), 0U);

@@ -125,7 +125,7 @@ Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found,
     if (auto done = whole.evaluator.claim(whole.view(), tolerance, models.views(), result.labels, evidence); !done) {
       return tl::unexpected(to_error(done.error()));
     }
-    forget_beyond(found.size(), result.labels);
+    if (!hidden.empty()) forget_beyond(found.size(), result.labels);
   } else {
     evidence.resize(found.size());
     if (auto done = weigh_own(whole, models.views().first(found.size()), result.labels, evidence); !done) return done;

@@ -5,34 +5,24 @@
 #include <cstring>
 #include <numeric>
 
+#include "kernels/bit_spread.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
 constexpr int kCellBits = 16;        // of a column
 constexpr int kSampleCellBits = 11;  // where a part of the cloud is sorted, whose points are farther apart: three digits instead of five
 
-/// Every bit of a byte followed by `gap` zeros.
-constexpr std::array<std::uint32_t, 256> spread_bytes(int gap) {
-  std::array<std::uint32_t, 256> spread{};
-  for (std::uint32_t byte = 0; byte < 256; ++byte) {
-    for (int bit = 0; bit < 8; ++bit) spread[byte] |= ((byte >> bit) & 1U) << (bit * (gap + 1));
-  }
-  return spread;
-}
-constexpr std::array<std::array<std::uint32_t, 256>, models::kMaxDimension> kSpread{spread_bytes(0), spread_bytes(1), spread_bytes(2),
-                                                                                    spread_bytes(3)};
-
 /// Interleaves the bits of the quantised columns.
 std::uint64_t morton(const models::WorkingPoints& points, std::size_t i, int bits) {
   const int dim = points.dimension();
-  const auto& spread = kSpread[static_cast<std::size_t>(dim - 1)];
+  const kernels::BitSpread spread(dim);
   std::uint64_t code = 0;
   for (int d = 0; d < dim; ++d) {
     // The working frame has unit spread: +-4 holds all but far outliers, which are clamped.
     const double t = std::clamp((points.at(i, d) + 4.0) / 8.0, 0.0, 1.0);
     const auto cell = static_cast<std::uint32_t>(t * ((1U << bits) - 1U));
-    const std::uint64_t low = spread[cell & 255U], high = spread[cell >> 8];
-    code |= (high << (8 * dim) | low) << (dim - 1 - d);
+    code |= spread(cell) << (dim - 1 - d);
   }
   return code;
 }
