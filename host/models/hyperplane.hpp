@@ -26,6 +26,7 @@ class Hyperplane : public ModelSpace {
   int least_rank() const noexcept override { return D - 1; }
   int parameter_count() const noexcept override { return D + 1; }
   int freedom() const noexcept override { return D; }
+  int free_normal() const noexcept override { return max_angle_ ? 0 : D; }
 
   bool from_sample(const WorkingPoints& points, std::span<const std::uint32_t> sample, Position& theta) const override {
     const Vector origin = points.template point<D>(sample[0]);

@@ -52,6 +52,8 @@ class ModelSpace {
   virtual bool costly_samples() const noexcept { return false; }
   /// Length of a curve inside a box of the plane [working frame], by which chance has more points near it; 0 where it does not matter.
   virtual double length_within(const Position&, const Eigen::Vector2d& /*low*/, const Eigen::Vector2d& /*high*/) const { return 0; }
+  /// Entries of the unit normal that a position begins with, where an offset is all that follows and no prior binds either; else 0.
+  virtual int free_normal() const noexcept { return 0; }
   /// Degrees of freedom: rank of the covariance.
   virtual int freedom() const noexcept = 0;
 

@@ -32,6 +32,7 @@ Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Ra
   own_best_.resize(m);
   fitness_.resize(m);
   own_fitness_.resize(m);
+  if (space.free_normal() > 0 && settings.renewal_share == 0) together_.emplace(static_cast<std::size_t>(space.free_normal()), m);
 }
 
 bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds) {
@@ -137,9 +138,45 @@ void Swarm::move(const Sampler& sampler) {
   for (std::size_t j = 0; j < positions_.size(); ++j) {
     if (own_best_[j].size() == 0) own_best_[j] = positions_[j];
   }
+  if (together_) return fly_together();
   for_particles([&](std::size_t j) {
     if (!renew(sampler, j)) fly(j);
   });
+}
+
+void Swarm::fly_together() {
+  using Row = kernels::HyperplaneFlight::Row;
+  kernels::HyperplaneFlight& flight = *together_;
+  const std::size_t width = flight.axes() + 1;
+  const auto put = [&](Row row, std::size_t j, const models::Position& values) {
+    for (std::size_t d = 0; d < width; ++d) flight.row(row, d)[j] = values[static_cast<Eigen::Index>(d)];
+  };
+  const double own = chi_ * settings_.cognitive, best = chi_ * settings_.social;
+  for (std::size_t j = 0; j < positions_.size(); ++j) {
+    put(Row::position, j, positions_[j]);
+    put(Row::velocity, j, velocities_[j]);
+    put(Row::own, j, own_best_[j]);
+    put(Row::best, j, attractor(j));
+    for (std::size_t d = 0; d < width; d += 2) {
+      const auto words = factors(j, d);
+      for (std::size_t e = d; e < std::min(d + 2, width); ++e) {
+        flight.row(Row::pull_own, e)[j] = own * Random::unit(words[2 * (e - d)]);
+        flight.row(Row::pull_best, e)[j] = best * Random::unit(words[2 * (e - d) + 1]);
+      }
+    }
+  }
+  flight.step(chi_ * settings_.inertia);  // Eq. (1)
+  for (std::size_t j = 0; j < positions_.size(); ++j) {
+    for (std::size_t d = 0; d < width; ++d) {
+      positions_[j][static_cast<Eigen::Index>(d)] = flight.row(Row::position, d)[j];
+      velocities_[j][static_cast<Eigen::Index>(d)] = flight.row(Row::velocity, d)[j];
+    }
+  }
+}
+
+std::array<std::uint32_t, 4> Swarm::factors(std::size_t j, std::size_t d) const {
+  return random_.words(Draw::move, round_, static_cast<std::uint32_t>(steps_),
+                       static_cast<std::uint32_t>(j) * 16 + static_cast<std::uint32_t>(d / 2));
 }
 
 bool Swarm::renew(const Sampler& sampler, std::size_t j) {
@@ -155,12 +192,11 @@ bool Swarm::renew(const Sampler& sampler, std::size_t j) {
 
 void Swarm::fly(std::size_t j) {
   const auto width = static_cast<std::size_t>(space_.parameter_count());
-  const auto particle = static_cast<std::uint32_t>(j), steps = static_cast<std::uint32_t>(steps_);
   models::Position to_own(static_cast<Eigen::Index>(width)), to_best(static_cast<Eigen::Index>(width));
   space_.difference(positions_[j], own_best_[j], to_own);
   space_.difference(positions_[j], attractor(j), to_best);
   for (std::size_t d = 0; d < width; d += 2) {
-    const auto words = random_.words(Draw::move, round_, steps, particle * 16 + static_cast<std::uint32_t>(d / 2));
+    const auto words = factors(j, d);
     for (std::size_t e = d; e < std::min(d + 2, width); ++e) {
       const auto at = static_cast<Eigen::Index>(e);
       const double r1 = Random::unit(words[2 * (e - d)]), r2 = Random::unit(words[2 * (e - d) + 1]);

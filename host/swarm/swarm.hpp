@@ -1,9 +1,11 @@
 // One swarm: particles that fly over a landscape until the best place found has stood still (Algorithm 1 of Zhou et al. 2010).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,6 +14,7 @@
 #include "host/swarm/random.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/settings.hpp"
+#include "kernels/hyperplane_flight.hpp"
 
 namespace swarmfit::swarm {
 
@@ -58,6 +61,10 @@ class Swarm {
   /// Puts a particle whose turn it is at a new sample; false where it is not, or the data yield none.
   bool renew(const Sampler& sampler, std::size_t particle);
   void fly(std::size_t particle);
+  /// The same for all of a swarm at once, where kernels know how.
+  void fly_together();
+  /// The random r1 and r2 of Eq. (1) for a particle's entries d and d + 1, at this step.
+  std::array<std::uint32_t, 4> factors(std::size_t particle, std::size_t d) const;
   /// What the body does with one particle must not matter to another.
   void for_particles(const std::function<void(std::size_t)>& body) const;
   const models::Position& attractor(std::size_t particle) const;
@@ -74,6 +81,7 @@ class Swarm {
   double still_since_ = 0;  // fitness of the global best when it last moved
   std::vector<models::Position> positions_, velocities_, own_best_;
   std::vector<double> fitness_, own_fitness_;
+  std::optional<kernels::HyperplaneFlight> together_;
   std::deque<GlobalBest> list_;
 };
 
