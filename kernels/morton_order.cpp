@@ -22,8 +22,12 @@ std::pair<float, float> bulk(const float* column, std::size_t count) {
   std::vector<float> sample;
   const std::size_t stride = count / kSample + 1;
   for (std::size_t i = 0; i < count; i += stride) sample.push_back(column[i]);
-  std::sort(sample.begin(), sample.end());
-  const float low = sample[sample.size() / 50], high = sample[sample.size() - 1 - sample.size() / 50];
+  const auto place = [&](std::size_t k) { return sample.begin() + static_cast<std::ptrdiff_t>(k); };
+  const std::size_t lower = sample.size() / 50, upper = sample.size() - 1 - lower;
+  std::nth_element(sample.begin(), place(lower), sample.end());
+  const float low = sample[lower];
+  std::nth_element(place(lower), place(upper), sample.end());
+  const float high = sample[upper];
   const float margin = (high - low) / 4;
   return {low - margin, high + margin};
 }

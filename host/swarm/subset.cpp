@@ -32,12 +32,12 @@ struct Coded {
   std::uint32_t index;
 };
 
-/// Sorts by code; what has the same stays in its order. A digit at a time, from the lowest.
-void sort_by_code(std::vector<Coded>& coded, int bits) {
-  constexpr int kDigitBits = 11;
-  constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+/// Sorts by code; what has the same stays in its order. A digit of so many bits at a time, from the lowest.
+template <int DigitBits>
+void sort_by_digits(std::vector<Coded>& coded, int bits) {
+  constexpr std::size_t kDigits = std::size_t{1} << DigitBits;
   std::vector<Coded> room(coded.size());
-  for (int shift = 0; shift < bits; shift += kDigitBits) {
+  for (int shift = 0; shift < bits; shift += DigitBits) {
     std::array<std::uint32_t, kDigits> at{};
     const auto digit = [&](const Coded& one) { return (one.code >> shift) & (kDigits - 1); };
     for (const Coded& one : coded) ++at[digit(one)];
@@ -45,6 +45,11 @@ void sort_by_code(std::vector<Coded>& coded, int bits) {
     for (const Coded& one : coded) room[at[digit(one)]++] = one;
     coded.swap(room);
   }
+}
+
+void sort_by_code(std::vector<Coded>& coded, int bits) {
+  constexpr std::size_t kFew = 4096;  // to count many digits would take as long as to count the points
+  coded.size() < kFew ? sort_by_digits<8>(coded, bits) : sort_by_digits<11>(coded, bits);
 }
 
 /// some(first, last) for ranges of a length that is a multiple of 64 and together make up [0, count).
