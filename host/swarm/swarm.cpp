@@ -157,12 +157,11 @@ void Swarm::fly_together() {
     put(Row::velocity, j, velocities_[j]);
     put(Row::own, j, own_best_[j]);
     put(Row::best, j, attractor(j));
-    for (std::size_t d = 0; d < width; d += 2) {
-      const auto words = factors(j, d);
-      for (std::size_t e = d; e < std::min(d + 2, width); ++e) {
-        flight.row(Row::pull_own, e)[j] = own * Random::unit(words[2 * (e - d)]);
-        flight.row(Row::pull_best, e)[j] = best * Random::unit(words[2 * (e - d) + 1]);
-      }
+    // Half a word tells r1 and another r2: as even as a flight can show, for half the random numbers.
+    const auto words = factors(j, 0);
+    for (std::size_t d = 0; d < width; ++d) {
+      flight.row(Row::pull_own, d)[j] = own * Random::unit(words[d]);
+      flight.row(Row::pull_best, d)[j] = best * Random::unit(words[d] << 16);
     }
   }
   flight.step(chi_ * settings_.inertia);  // Eq. (1)
