@@ -41,9 +41,13 @@ void MultiModel::restore_caps() {
 }
 
 std::span<const float> MultiModel::levelled(std::span<const float> values, std::vector<float>& room) const {
-  if (allowed_.empty()) return values;
+  return levelled(values, room, allowed_);
+}
+
+std::span<const float> MultiModel::levelled(std::span<const float> values, std::vector<float>& room, std::span<const float> allowed) const {
+  if (allowed.empty()) return values;
   room.resize(values.size());
-  for (std::size_t i = 0; i < room.size(); ++i) room[i] = values[i] * (tau_ / allowed_[i]);
+  for (std::size_t i = 0; i < room.size(); ++i) room[i] = values[i] * (tau_ / allowed[i]);
   return room;
 }
 

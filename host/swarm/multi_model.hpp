@@ -154,6 +154,8 @@ class MultiModel {
   double loss_of_nothing(std::span<const float> caps) const;
   /// Distances or caps, one a point, in measures that make the threshold of each tau; in `room` where they are not so already.
   std::span<const float> levelled(std::span<const float> values, std::vector<float>& room) const;
+  /// The same of values of some points, by thresholds of those.
+  std::span<const float> levelled(std::span<const float> values, std::vector<float>& room, std::span<const float> allowed) const;
   /// Are a candidate's distances kept? Of very many points they would be most of the memory; they are told anew, a run at a time.
   bool lists_distances() const noexcept;
   /// visit(first, distances) for runs of points, from the first to the last.

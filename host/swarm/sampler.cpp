@@ -23,11 +23,12 @@ Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint3
   alive_.assign(candidates.size(), 1);
 }
 
-bool Sampler::leave_out(std::span<const float> values, float least, std::size_t enough) {
+template <class Stays>
+bool Sampler::leave_out(const Stays& stays, std::size_t enough) {
   live_.resize(candidates_.size());
   std::size_t kept = 0;
   for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
-    const bool alive = values[candidates_[place]] >= least;
+    const bool alive = stays(place);
     alive_[place] = alive ? 1 : 0;
     live_[kept] = place;  // overwritten by the next if it is not alive
     kept += alive ? 1 : 0;
@@ -41,12 +42,13 @@ bool Sampler::leave_out(std::span<const float> values, float least, std::size_t 
 }
 
 void Sampler::prefer_unexplained(std::span<const float> caps, float least) {
-  leave_out(caps, least, static_cast<std::size_t>(4 * space_.minimal_sample()));
+  leave_out([&](std::uint32_t place) { return caps[place] >= least; }, static_cast<std::size_t>(4 * space_.minimal_sample()));
 }
 
 bool Sampler::keep_to(std::span<const float> marks) {
   constexpr float kMarked = 0.5F;
-  return leave_out(marks, kMarked, static_cast<std::size_t>(space_.minimal_sample() + 2));
+  return leave_out([&](std::uint32_t place) { return marks[candidates_[place]] >= kMarked; },
+                   static_cast<std::size_t>(space_.minimal_sample() + 2));
 }
 
 bool Sampler::nearby(std::size_t first, std::span<const std::uint32_t> words, std::span<std::uint32_t> places) const {

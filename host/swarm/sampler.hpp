@@ -21,14 +21,15 @@ class Sampler {
   /// A model through a sample. `local`: of nearby points. False if some tens of samples were all degenerate.
   bool draw(bool local, std::uint32_t round, std::uint32_t step, std::uint32_t particle, models::Position& theta) const;
 
-  /// Leaves out candidates whose cap has sunk below `least`, as long as enough remain.
+  /// Leaves out candidates whose cap, one a candidate, has sunk below `least`, as long as enough remain.
   void prefer_unexplained(std::span<const float> caps, float least);
-  /// Draws from candidates of which marks are not 0 alone; false, and nothing changes, where these are hardly more than a sample.
+  /// Draws from candidates of which marks, one a point, are not 0 alone; false, and nothing changes, where these are hardly more than a sample.
   bool keep_to(std::span<const float> marks);
 
  private:
-  /// Leaves out candidates whose value is below `least`; all are left where that leaves fewer than `enough`.
-  bool leave_out(std::span<const float> values, float least, std::size_t enough);
+  /// Leaves out candidates at places of which stays(place) does not hold; all are left where that leaves fewer than `enough`.
+  template <class Stays>
+  bool leave_out(const Stays& stays, std::size_t enough);
 
   const models::WorkingPoints& points_;
   const models::ModelSpace& space_;

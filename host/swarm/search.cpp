@@ -68,8 +68,10 @@ Expected<bool> MultiModel::fly(Swarm& swarm, std::size_t kind, std::uint32_t rou
   // Normals bring neighbourhoods that are too close for a kind which has no use for them.
   const bool close = points_.dimension() > 3 || space(kind).needs_normals();
   Sampler sampler(points_, part_.index(), close ? neighbours_ : none_, space(kind), random_);
-  std::vector<float> room;
-  sampler.prefer_unexplained(levelled(caps, room), alive);
+  std::vector<float> left, room;
+  const bool shown = settings_.deflation == Deflation::residual;  // else the caps only tell what a model still explains
+  if (!shown) part_.gather(caps, left);
+  sampler.prefer_unexplained(levelled(shown ? part_caps_ : left, room, part_allowed_), alive);
   scale_ = loss_of_nothing(caps);
   swarm.share_work(evaluator_);
   if (settings_.deflation == Deflation::residual) landscapes_[kind].expect(background(kind, caps));

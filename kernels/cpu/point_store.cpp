@@ -183,20 +183,20 @@ void PointStore::keep_costly() {
   costly_.blocks = (costly_.points + kBlockPoints - 1) / kBlockPoints;
   const auto width = static_cast<std::size_t>(dimension_);
   const std::size_t padded = costly_.blocks * kBlockPoints;
-  // One more place: what is written there next is not kept if it costs nothing.
-  costly_.caps.resize(padded + 1);
-  for (std::size_t c = 0; c < width; ++c) costly_.columns[c].resize(padded + 1);
-  std::size_t at = 0;
+  places_.resize(costly_.points + 1);  // what is written to the last is not kept
   const float* const caps = all_.caps.data();
-  for (std::size_t i = 0; i < finite_; ++i) {
-    costly_.caps[at] = caps[i];
-    for (std::size_t c = 0; c < width; ++c) costly_.columns[c][at] = all_.columns[c][i];
+  std::size_t at = 0;
+  for (std::uint32_t i = 0; i < finite_; ++i) {
+    places_[at] = i;
     at += caps[i] > 0 ? 1 : 0;
   }
-  std::fill(costly_.caps.begin() + static_cast<std::ptrdiff_t>(at), costly_.caps.end(), 0.0F);
-  for (std::size_t c = 0; c < width; ++c) {
-    std::fill(costly_.columns[c].begin() + static_cast<std::ptrdiff_t>(at), costly_.columns[c].end(), 0.0F);
-  }
+  const auto take = [&](const Aligned<float>& from, Aligned<float>& to) {
+    to.resize(padded);
+    for (std::size_t k = 0; k < costly_.points; ++k) to[k] = from[places_[k]];
+    std::fill(to.begin() + static_cast<std::ptrdiff_t>(costly_.points), to.end(), 0.0F);
+  };
+  take(all_.caps, costly_.caps);
+  for (std::size_t c = 0; c < width; ++c) take(all_.columns[c], costly_.columns[c]);
 }
 
 Summing PointStore::summing(Loss loss) const noexcept {
