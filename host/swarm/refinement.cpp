@@ -7,7 +7,6 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr double kWorthwhile = 1e-5;  // a fall of the loss below this share of it ends the rounds
-constexpr double kWorthwhileOnPart = 1e-3;  // the same on a part of the points, after which all have their say
 
 /// Does the refinement need to know each point's distance, beside what a pass tells?
 bool needs_distances(const Ground& ground, Loss loss) { return !ground.space.closed_form() || loss != Loss::truncated_l1; }
@@ -119,7 +118,7 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
     if (!evidence) return tl::unexpected(evidence.error());
     const double now = loss_of(*evidence, loss, caps, tried);
     if (!(now < best)) break;
-    const bool worthwhile = best - now > (ground.part != nullptr ? kWorthwhileOnPart : kWorthwhile) * best;
+    const bool worthwhile = best - now > kWorthwhile * best;
     theta = candidate;
     best = now;
     kept.swap(tried);
