@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
-#include <new>
 #include <optional>
 
 #include <fmt/format.h>
@@ -13,6 +12,7 @@
 #include <swarmfit/points.hpp>
 
 #include "host/bench/bench_case.hpp"
+#include "host/common/thrown.hpp"
 #include "host/models/model_space.hpp"
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/subset.hpp"
@@ -231,7 +231,8 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
   }
   std::optional<swarm::Rows> rows;
   if (cloud) rows = finite_rows(*cloud);
-  Bench runner(options, progress);
+  const std::function<void(const std::string&)> told = common::going_by(progress);
+  Bench runner(options, told);
   if (auto done = runner.raise_limit(); !done) return tl::unexpected(done.error());
   for (const ModelType type : types) {
     if (cloud) {
@@ -252,8 +253,8 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
     }
   }
   return std::move(runner).report();
-} catch (const std::bad_alloc&) {
-  return fail(Error::Kind::out_of_memory, "no memory for the benchmark");
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [] { return std::string("no memory for the benchmark"); });
 }
 
 }  // namespace swarmfit

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "host/common/thrown.hpp"
 #include "host/figures/chart.hpp"
 #include "host/figures/flight.hpp"
 #include "host/figures/line_scene.hpp"
@@ -298,7 +299,7 @@ Expected<Figure> several_figure(std::uint64_t seed) {
 
 }  // namespace
 
-Expected<std::vector<Figure>> paper_figures(std::uint64_t seed) {
+Expected<std::vector<Figure>> paper_figures(std::uint64_t seed) try {
   const LineScene scene = make_line_scene(random_segments(1, seed), seed);
   FitOptions options;
   options.model = ModelType::line2d;
@@ -313,6 +314,8 @@ Expected<std::vector<Figure>> paper_figures(std::uint64_t seed) {
   if (!several) return tl::unexpected(several.error());
   all.push_back(std::move(*several));
   return all;
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [] { return std::string("no memory for the figures"); });
 }
 
 }  // namespace swarmfit

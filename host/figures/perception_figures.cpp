@@ -12,6 +12,7 @@
 
 #include <swarmfit/figures.hpp>
 
+#include "host/common/thrown.hpp"
 #include "host/io/jpeg.hpp"
 #include "host/io/palette.hpp"
 #include "host/perception/boundary.hpp"
@@ -161,7 +162,7 @@ std::vector<Figure> draw(const Stages& s, const PerceiveOptions& options) {
 
 }  // namespace
 
-Expected<std::vector<Figure>> perception_figures(const Cloud& frame, const PerceiveOptions& options) {
+Expected<std::vector<Figure>> perception_figures(const Cloud& frame, const PerceiveOptions& options) try {
   if (!frame.organised() || !frame.coloured())
     return fail(Error::Kind::bad_input, "the frame has no image grid or no colour, must have both for figures of outlines");
   auto perceiver = Perceiver::create(options);
@@ -172,6 +173,8 @@ Expected<std::vector<Figure>> perception_figures(const Cloud& frame, const Perce
   stages.regions = perception::soi_regions(stages.input, stages.grid, options.soi_margin, 2, options.fit.threads);
   stages.photo = cv::Mat3b(frame.height, frame.width, reinterpret_cast<cv::Vec3b*>(const_cast<std::uint8_t*>(frame.rgb.data())));
   return draw(stages, options);
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [] { return std::string("no memory for the figures"); });
 }
 
 }  // namespace swarmfit

@@ -1,12 +1,12 @@
 // Depth images and RGB-D frames to organised clouds.
 #include <cmath>
 #include <limits>
-#include <new>
 #include <vector>
 
 #include <swarmfit/cloud.hpp>
 #include <swarmfit/images.hpp>
 
+#include "host/common/thrown.hpp"
 #include "host/io/file.hpp"
 #include "host/io/grid.hpp"
 #include "host/io/image.hpp"
@@ -146,8 +146,9 @@ Expected<Cloud> make_cloud(const DepthView& depth, const Intrinsics& intrinsics,
   }
   io::take_colours(*pixels, colour.order == ColourView::Order::rgb, cloud);
   return cloud;
-} catch (const std::bad_alloc&) {
-  return fail(Error::Kind::out_of_memory, fmt::format("no memory for {} x {} pixels", depth.width, depth.height));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input,
+                                 [&] { return fmt::format("no memory for {} x {} pixels", depth.width, depth.height); });
 }
 
 }  // namespace swarmfit

@@ -94,13 +94,16 @@ Expected<PendingFile> PendingFile::write(const std::filesystem::path& file, std:
   std::filesystem::path target = exists ? std::filesystem::canonical(file, error) : file;  // a link stays a link
   if (error) return cannot(error.value());
   static std::atomic<unsigned> counter = 0;
-  const std::filesystem::path temporary =
-      target.parent_path() / fmt::format(".{}.{}-{}.tmp", target.filename().string(), ::getpid(), counter++);
+  std::filesystem::path temporary = target.parent_path() / fmt::format(".{}.{}-{}.tmp", target.filename().string(), ::getpid(), counter++);
   const Descriptor out{::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)};
   if (out.fd < 0) return cannot(errno);
-  PendingFile pending(std::move(target), temporary);
+  PendingFile pending(std::move(target), std::move(temporary));  // takes no memory: what is there now goes again
   if (!write_all(out.fd, bytes)) return cannot(errno);
   return pending;
+}
+
+Tentative::~Tentative() {
+  if (new_) std::remove(path_.c_str());
 }
 
 Expected<> PendingFile::commit() {

@@ -8,10 +8,13 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include <swarmfit/error.hpp>
+
+#include "host/common/thrown.hpp"
 
 namespace swarmfit::io {
 
@@ -49,6 +52,21 @@ class PendingFile {
   std::filesystem::path temporary_;
 };
 
+/// A file or an empty folder that goes again when its scope ends, if it is new and is not kept.
+class Tentative {
+ public:
+  explicit Tentative(std::filesystem::path path) : path_(std::move(path)) {}
+  ~Tentative();
+  Tentative(const Tentative&) = delete;
+  Tentative& operator=(const Tentative&) = delete;
+  void is_new(bool yes) noexcept { new_ = yes; }
+  void keep() noexcept { new_ = false; }
+
+ private:
+  std::filesystem::path path_;
+  bool new_ = false;
+};
+
 /// "file: what is wrong".
 template <class... Args>
 tl::unexpected<Error> bad_input(const std::filesystem::path& file, fmt::format_string<Args...> format, Args&&... args) {
@@ -61,12 +79,17 @@ std::string excerpt(std::string_view text);
 /// Runs a reader or writer and turns what it may throw into an Error.
 template <class F>
 auto guarded(const std::filesystem::path& file, Error::Kind kind, F&& body) -> decltype(body()) {
+  const auto too_large = [&] { return file.string() + ": does not fit in memory"; };
   try {
     return body();
   } catch (const std::bad_alloc&) {
-    return fail(Error::Kind::out_of_memory, file.string() + ": does not fit in memory");
+    return tl::unexpected(common::no_memory(too_large));
   } catch (const std::exception& e) {
-    return fail(kind, file.string() + ": " + excerpt(e.what()));
+    try {
+      return fail(kind, file.string() + ": " + excerpt(e.what()));
+    } catch (const std::bad_alloc&) {
+      return tl::unexpected(common::no_memory(too_large));
+    }
   }
 }
 

@@ -84,24 +84,21 @@ using Files = std::vector<std::pair<const char*, std::string>>;
 
 /// All temporaries first, then all renames. A folder made for files that could not be written goes again.
 Expected<> write_all(const fs::path& folder, const Files& files) {
+  io::Tentative made(folder);
   std::error_code error;
-  const bool made = fs::create_directories(folder, error);
+  made.is_new(fs::create_directories(folder, error));
   if (error) return cannot_write(folder, error.message());
-  const auto write = [&]() -> Expected<> {
-    std::vector<io::PendingFile> pending;
-    for (const auto& [name, bytes] : files) {
-      auto file = io::PendingFile::write(folder / name, bytes);
-      if (!file) return tl::unexpected(std::move(file.error()));
-      pending.push_back(std::move(*file));
-    }
-    for (auto& file : pending) {
-      if (auto ok = file.commit(); !ok) return ok;
-    }
-    return {};
-  };
-  auto written = write();
-  if (!written && made) fs::remove(folder, error);
-  return written;
+  std::vector<io::PendingFile> pending;
+  for (const auto& [name, bytes] : files) {
+    auto file = io::PendingFile::write(folder / name, bytes);
+    if (!file) return tl::unexpected(std::move(file.error()));
+    pending.push_back(std::move(*file));
+  }
+  for (auto& file : pending) {
+    if (auto ok = file.commit(); !ok) return ok;
+  }
+  made.keep();
+  return {};
 }
 
 }  // namespace

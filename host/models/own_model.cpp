@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <limits>
+#include <new>
 #include <utility>
 
 #include <fmt/format.h>
@@ -40,12 +41,17 @@ Expected<> OwnModel::validate() const {
 
 namespace models {
 
-void OwnWatch::note(const std::string& what) {
+void OwnWatch::note(Error::Kind kind, const char* function, const char* what) noexcept {
   const std::lock_guard lock(mutex_);
-  if (!first_) first_ = what;
+  if (first_) return;
+  first_ = Error{kind, "own model threw"};  // short enough to need no memory
+  try {
+    first_->message = fmt::format("own.{} threw{}{}", function, what ? ": " : " ", what ? what : "what is no std::exception");
+  } catch (const std::bad_alloc&) {
+  }
 }
 
-std::optional<std::string> OwnWatch::take() {
+std::optional<Error> OwnWatch::take() {
   const std::lock_guard lock(mutex_);
   return std::exchange(first_, std::nullopt);
 }
@@ -57,10 +63,12 @@ template <class Out, class Work>
 Out guarded(OwnWatch& watch, const char* function, Out otherwise, Work&& work) noexcept {
   try {
     return work();
+  } catch (const std::bad_alloc& e) {
+    watch.note(Error::Kind::out_of_memory, function, e.what());
   } catch (const std::exception& e) {
-    watch.note(fmt::format("own.{} threw: {}", function, e.what()));
+    watch.note(Error::Kind::bad_input, function, e.what());
   } catch (...) {
-    watch.note(fmt::format("own.{} threw what is no std::exception", function));
+    watch.note(Error::Kind::bad_input, function, nullptr);
   }
   return otherwise;
 }

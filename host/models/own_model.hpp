@@ -4,8 +4,8 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <string>
 
+#include <swarmfit/error.hpp>
 #include <swarmfit/own_model.hpp>
 
 #include "kernels/own/own_model.hpp"
@@ -15,13 +15,14 @@ namespace swarmfit::models {
 /// What an own model's functions threw first. Nothing of it passes through the library: a residual that throws is NaN, all else is false.
 class OwnWatch {
  public:
-  void note(const std::string& what);
+  /// `what`: an exception's words; null where it has none.
+  void note(Error::Kind kind, const char* function, const char* what) noexcept;
   /// What was noted since, and forgets it.
-  std::optional<std::string> take();
+  std::optional<Error> take();
 
  private:
   std::mutex mutex_;
-  std::optional<std::string> first_;
+  std::optional<Error> first_;
 };
 
 /// The same model with its functions watched.

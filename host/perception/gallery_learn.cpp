@@ -13,6 +13,8 @@
 
 #include <swarmfit/results.hpp>
 
+#include "host/common/thrown.hpp"
+#include "host/io/file.hpp"
 #include "host/io/png.hpp"
 #include "host/perception/gallery_index.hpp"
 #include "host/perception/gallery_pictures.hpp"
@@ -67,17 +69,19 @@ Expected<LearntView> add_view(const fs::path& gallery, const std::string& name, 
                 fmt::format("{}: has {} features, must have >= {} to be known by", source, learnt.features, perception::kLeastInliers));
   const fs::path folder = gallery / name;
   std::error_code error;
-  const bool new_gallery = !fs::exists(gallery, error), new_name = !fs::exists(folder, error);
+  io::Tentative whole(gallery), named(folder);
+  whole.is_new(!fs::exists(gallery, error));
+  named.is_new(!fs::exists(folder, error));
   fs::create_directories(folder, error);
   if (error) return fail(Error::Kind::cannot_write, fmt::format("{}: cannot be made: {}", folder.string(), error.message()));
   learnt.file = free_file(folder, extension);
+  io::Tentative view(learnt.file);
+  view.is_new(true);
   auto done = write_text(learnt.file, picture);
   if (done) done = write_index(gallery, learnt, name);
-  if (done) return learnt;
-  fs::remove(learnt.file, error);
-  if (new_name) fs::remove(folder, error);
-  if (new_gallery) fs::remove(gallery, error);
-  return tl::unexpected(done.error());
+  if (!done) return tl::unexpected(done.error());
+  for (io::Tentative* one : {&whole, &named, &view}) one->keep();
+  return learnt;
 }
 
 /// The k-th object's pixels, or those of the one with the most; k is set.
@@ -98,14 +102,16 @@ Expected<cv::Mat1b> object_mask(const Cloud& frame, const PerceiveResult& result
 }  // namespace
 
 Expected<LearntView> learn_image(const fs::path& gallery, const std::string& name, const fs::path& image) {
-  if (!perception::is_image(image)) return fail(Error::Kind::bad_input, image.string() + ": is no image by its ending");
-  const auto bytes = perception::read_picture(image);
-  if (!bytes) return tl::unexpected(bytes.error());
-  return add_view(gallery, name, *bytes, image.extension().string(), image.string());
+  return io::guarded(image, Error::Kind::bad_input, [&]() -> Expected<LearntView> {
+    if (!perception::is_image(image)) return fail(Error::Kind::bad_input, image.string() + ": is no image by its ending");
+    const auto bytes = perception::read_picture(image);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return add_view(gallery, name, *bytes, image.extension().string(), image.string());
+  });
 }
 
 Expected<LearntView> learn_object(const fs::path& gallery, const std::string& name, const Cloud& frame, const PerceiveResult& result,
-                                  std::size_t object) {
+                                  std::size_t object) try {
   const auto mask = object_mask(frame, result, object);
   if (!mask) return tl::unexpected(mask.error());
   const cv::Mat rgb(frame.height, frame.width, CV_8UC3, const_cast<std::uint8_t*>(frame.rgb.data()));  // only read
@@ -115,6 +121,8 @@ Expected<LearntView> learn_object(const fs::path& gallery, const std::string& na
   cv::Mat picture;
   cv::merge(std::vector<cv::Mat>{rgb(box), (*mask)(box)}, picture);
   return add_view(gallery, name, io::encode_png(picture), ".png", fmt::format("object {}", object));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [&] { return fmt::format("no memory for object {}", object); });
 }
 
 }  // namespace swarmfit

@@ -1,13 +1,13 @@
 // The whole chain: vertical, supporting planes, pop-out, objects, outlines, names.
 #include <algorithm>
 #include <chrono>
-#include <new>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <swarmfit/perception.hpp>
 
+#include "host/common/thrown.hpp"
 #include "host/models/working_points.hpp"
 #include "host/perception/grid.hpp"
 #include "host/perception/objects.hpp"
@@ -84,6 +84,18 @@ SwarmObserver in_data_frame(const SwarmObserver& observer, const Eigen::Vector3d
   };
 }
 
+/// A fitter that is observed until the end of a block.
+class Watching {
+ public:
+  Watching(Fitter& fitter, SwarmObserver observer) : fitter_(fitter) { fitter_.observe(std::move(observer)); }
+  ~Watching() { fitter_.observe({}); }
+  Watching(const Watching&) = delete;
+  Watching& operator=(const Watching&) = delete;
+
+ private:
+  Fitter& fitter_;
+};
+
 }  // namespace
 
 struct Perceiver::State {
@@ -96,7 +108,8 @@ struct Perceiver::State {
   SwarmObserver observer;
   std::unique_ptr<kernels::ColourCosts> colours;  ///< where the fitter works; made for the first frame with a picture
 
-  FitOptions fit_options() const;
+  FitOptions fit_options() const { return fit_options(vertical); }
+  FitOptions fit_options(const std::optional<perception::Vertical>& with) const;
   Expected<> suit_sensor(const Cloud& frame);
   Expected<> find_vertical(const Cloud& frame, const PointGrid& grid, const perception::Overview& overview, const std::stop_token& stop,
                            PerceiveResult& result);
@@ -105,27 +118,30 @@ struct Perceiver::State {
   Expected<> find_outlines(const Cloud& frame, PerceiveResult& result);
 };
 
-FitOptions Perceiver::State::fit_options() const {
+FitOptions Perceiver::State::fit_options(const std::optional<perception::Vertical>& with) const {
   FitOptions fit = options.fit;
   // Surfaces are refined on all points afterwards: a swarm need not settle.
   if (fit.preset == Preset::fast && !fit.stall) fit.stall = kStall;
-  if (!vertical) {
+  if (!with) {
     fit.prior.reset();
     fit.max_models = kPlanesOfFirstView;
     return fit;
   }
   // What is level in one room is level to each other; and without normals there is little else to tell a surface from clutter.
   const bool narrow = stereo && !options.gravity && !options.camera_tilt;
-  const double angle = vertical->source == perception::kFromDominantPlane ? kStereoAngle : kStereoAngleFromWall;
-  fit.prior = DirectionPrior{vertical->up, narrow ? std::min(options.horizontal_angle, angle) : options.horizontal_angle};
+  const double angle = with->source == perception::kFromDominantPlane ? kStereoAngle : kStereoAngleFromWall;
+  fit.prior = DirectionPrior{with->up, narrow ? std::min(options.horizontal_angle, angle) : options.horizontal_angle};
   return fit;
 }
 
 Expected<> Perceiver::State::suit_sensor(const Cloud& frame) {
   stereo = frame.passive_stereo;
   if (!frame.passive_stereo || options.fit.threshold || options.fit.estimate_threshold) return {};
+  FitOptions fit = fit_options();
+  fit.threshold = kStereoThreshold;
+  if (auto ok = fitter->set_options(fit); !ok) return ok;
   options.fit.threshold = kStereoThreshold;
-  return fitter->set_options(fit_options());
+  return {};
 }
 
 Expected<> Perceiver::State::find_vertical(const Cloud& frame, const PointGrid& grid, const perception::Overview& overview,
@@ -138,8 +154,12 @@ Expected<> Perceiver::State::find_vertical(const Cloud& frame, const PointGrid& 
   auto planes = perception::find_any_planes(*fitter, overview, suffice, stop);
   if (!planes) return tl::unexpected(planes.error());
   const auto edges = stereo ? perception::find_edges(frame, grid) : perception::ImageEdges{};
-  vertical = perception::vertical_from_planes(grid, planes->models, edges, overview.normals, options.horizontal_angle);
-  if (vertical) return fitter->set_options(fit_options());
+  auto seen = perception::vertical_from_planes(grid, planes->models, edges, overview.normals, options.horizontal_angle);
+  if (seen) {
+    if (auto ok = fitter->set_options(fit_options(seen)); !ok) return ok;
+    vertical = std::move(seen);
+    return {};
+  }
   // Nothing flat in this view; the next one may have it.
   planes->models.clear();
   planes->labels.assign(grid.size(), 0);
@@ -197,7 +217,7 @@ Perceiver::~Perceiver() = default;
 Perceiver::Perceiver(Perceiver&&) noexcept = default;
 Perceiver& Perceiver::operator=(Perceiver&&) noexcept = default;
 
-Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) {
+Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) try {
   if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
   auto state = std::make_unique<State>();
   state->options = options;
@@ -212,6 +232,8 @@ Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) {
     state->gallery.emplace(std::move(*loaded));
   }
   return Perceiver(std::move(state));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [] { return std::string("no memory for what perception holds"); });
 }
 
 void Perceiver::observe(SwarmObserver observer) { state_->observer = std::move(observer); }
@@ -237,10 +259,11 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   std::vector<Surface> supports;
   if (state_->vertical) {
     result.up = state_->vertical->up;
-    state_->fitter->observe(in_data_frame(state_->observer, grid.origin));
+    const ModelCallback told = common::going_by(on_plane);
+    const SwarmObserver observer = common::going_by(state_->observer);
+    const Watching watching(*state_->fitter, in_data_frame(observer, grid.origin));
     auto search =
-        perception::find_supports(*state_->fitter, grid, overview, result.up, state_->options, on_plane, stop, state_->last_planes(grid));
-    state_->fitter->observe({});
+        perception::find_supports(*state_->fitter, grid, overview, result.up, state_->options, told, stop, state_->last_planes(grid));
     if (!search) return tl::unexpected(search.error());
     result.fit = std::move(search->fit);
     supports = std::move(search->supports);
@@ -263,8 +286,8 @@ Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCall
   if (state_->options.track && !stop.stop_requested()) state_->tracker.follow(result);
   result.timing_ms.total = whole.lap();
   return result;
-} catch (const std::bad_alloc&) {
-  return fail(Error::Kind::out_of_memory, fmt::format("no memory for {} points", frame.size()));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [&] { return fmt::format("no memory for {} points", frame.size()); });
 }
 
 }  // namespace swarmfit

@@ -89,8 +89,10 @@ Eigen::Isometry3d common_motion(std::vector<Pair> pairs, const Eigen::Vector3d& 
 }  // namespace
 
 void Tracker::follow(PerceiveResult& frame) {
-  follow_planes(frame);
-  follow_spaces(frame);
+  Tracker next = *this;  // what is thrown on the way leaves this as it was
+  next.follow_planes(frame);
+  next.follow_spaces(frame);
+  *this = std::move(next);
 }
 
 std::vector<Model> Tracker::planes() const {

@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <exception>
-#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -16,6 +14,7 @@
 #include <swarmfit/results.hpp>
 #include <swarmfit/version.hpp>
 
+#include "host/common/thrown.hpp"
 #include "host/io/ground_image.hpp"
 #include "host/io/jpeg.hpp"
 #include "host/io/palette.hpp"
@@ -189,10 +188,8 @@ Expected<std::string> make_page(const std::string& result, const FitResult& fit,
 #else
   return std::move(parts).take();  // never: check_report() has failed
 #endif
-} catch (const std::bad_alloc&) {
-  return fail(Error::Kind::out_of_memory, fmt::format("no memory for a page of {} points", input.size()));
-} catch (const std::exception& e) {
-  return fail(Error::Kind::cannot_write, fmt::format("the page's image: {}", e.what()));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::cannot_write, [&] { return fmt::format("no memory for a page of {} points", input.size()); });
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // Many small fits: side by side on the processor, a fitter a thread, each with one thread of its own; in step on a device.
 #include <algorithm>
 #include <mutex>
+#include <new>
 #include <numeric>
 #include <utility>
 
@@ -9,6 +10,7 @@
 #include <swarmfit/batch.hpp>
 
 #include "host/common/parallel.hpp"
+#include "host/common/thrown.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/lock_step.hpp"
@@ -39,9 +41,13 @@ class Idle {
     }
     return Fitter::create(options_);
   }
-  void give(Fitter fitter) {
+  void give(Fitter fitter) noexcept {
     const std::lock_guard lock(mutex_);
-    fitters_.push_back(std::move(fitter));
+    try {
+      fitters_.push_back(std::move(fitter));
+    } catch (const std::bad_alloc&) {
+      // The next one is made anew.
+    }
   }
 
  private:
@@ -85,7 +91,7 @@ Expected<> fit_on_device(std::span<const PointsView> clouds, const FitOptions& o
 
 }  // namespace
 
-Expected<std::vector<Expected<FitResult>>> fit_batch(std::span<const PointsView> clouds, const FitOptions& options) {
+Expected<std::vector<Expected<FitResult>>> fit_batch(std::span<const PointsView> clouds, const FitOptions& options) try {
   if (clouds.size() > kMostClouds) {
     return fail(Error::Kind::invalid_option, fmt::format("clouds.size() is {}, must be <= {}", clouds.size(), kMostClouds));
   }
@@ -112,6 +118,8 @@ Expected<std::vector<Expected<FitResult>>> fit_batch(std::span<const PointsView>
     if (fitter) idle.give(std::move(*fitter));
   });
   return results;
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::backend_unavailable, [&] { return fmt::format("no memory for {} clouds", clouds.size()); });
 }
 
 }  // namespace swarmfit

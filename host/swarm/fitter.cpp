@@ -1,13 +1,13 @@
 // The public face of the fit: options and points are checked here, the work is done in multi_model.cpp.
 #include <algorithm>
 #include <cmath>
-#include <new>
 #include <optional>
 
 #include <fmt/format.h>
 
 #include <swarmfit/fit.hpp>
 
+#include "host/common/thrown.hpp"
 #include "host/models/model_space.hpp"
 #include "host/models/own_model.hpp"
 #include "host/swarm/fitter_parts.hpp"
@@ -134,11 +134,13 @@ Fitter::~Fitter() = default;
 Fitter::Fitter(Fitter&&) noexcept = default;
 Fitter& Fitter::operator=(Fitter&&) noexcept = default;
 
-Expected<Fitter> Fitter::create(const FitOptions& options) {
+Expected<Fitter> Fitter::create(const FitOptions& options) try {
   if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
   auto state = std::make_unique<State>();
   if (auto opened = state->open(options); !opened) return tl::unexpected(opened.error());
   return Fitter(std::move(state));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::backend_unavailable, [] { return std::string("no memory for a back end"); });
 }
 
 Fitter FitterParts::assemble(const FitOptions& options, std::unique_ptr<kernels::FitnessEvaluator> evaluator, std::string reason) {
@@ -153,7 +155,7 @@ void Fitter::observe(SwarmObserver observer) { state_->observer = std::move(obse
 
 const FitOptions& Fitter::options() const noexcept { return state_->options; }
 
-Expected<> Fitter::set_options(const FitOptions& options) {
+Expected<> Fitter::set_options(const FitOptions& options) try {
   if (auto ok = options.validate(); !ok) return ok;
   const FitOptions& old = state_->options;
   if (options.backend != old.backend)
@@ -163,8 +165,11 @@ Expected<> Fitter::set_options(const FitOptions& options) {
   if (options.pipeline_cache != old.pipeline_cache)
     return fail(Error::Kind::invalid_option, fmt::format("pipeline_cache is {}, must stay {}", options.pipeline_cache, old.pipeline_cache));
   if (options.own || old.own) return state_->open(options);
-  state_->options = options;
+  FitOptions wanted = options;
+  state_->options = std::move(wanted);
   return {};
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::backend_unavailable, [] { return std::string("no memory for a back end"); });
 }
 
 BackendInfo Fitter::backend() const {
@@ -214,7 +219,8 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   if (auto ok = check_backend(evaluator, kinds, searched); !ok) return tl::unexpected(ok.error());
 
   FitResult result;
-  swarm::Watch watch{state_->observer, 0};
+  const ModelCallback told = common::going_by(on_model);
+  swarm::Watch watch{common::going_by(state_->observer), 0};
   std::vector<swarm::Known> known;
   bool points_set = false;
   const std::optional<double> given = options.threshold ? options.threshold : default_threshold(options);
@@ -233,7 +239,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   std::optional<swarm::MultiModel> search(std::in_place, evaluator, kinds, working, part, options.seed, limits, spread);
   search->watched_by(state_->observer ? &watch : nullptr);
   if (points_set) search->points_are_set();
-  if (auto done = search->run(on_model, warm_start, result, known); !done) return tl::unexpected(done.error());
+  if (auto done = search->run(told, warm_start, result, known); !done) return tl::unexpected(done.error());
   std::vector<models::Placed> found = search->found(), hidden = search->hidden();
   const auto tau = static_cast<float>(result.threshold);
   const std::vector<float> allowed = swarm::allowed_by(thin_rows ? swarm::spread_of(options.noise, *whole, depth) : spread, tau);
@@ -249,14 +255,14 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   if (!search->hidden_owns()) hidden.clear();
   search.reset();  // of many points it holds much
   if (auto done = swarm::settle(ground, found, hidden, corners, result); !done) return tl::unexpected(done.error());
-  if (const auto thrown = state_->watch->take()) return fail(Error::Kind::bad_input, *thrown);
+  if (auto thrown = state_->watch->take()) return tl::unexpected(std::move(*thrown));
   result.backend = backend();
   result.seed = options.seed;
   result.finite_points = whole->finite_count();
   result.total_ms = std::chrono::duration<double, std::milli>(swarm::Clock::now() - limits.start).count();
   return result;
-} catch (const std::bad_alloc&) {
-  return fail(Error::Kind::out_of_memory, fmt::format("no memory for {} points", points.size()));
+} catch (...) {
+  return common::error_of_thrown(Error::Kind::bad_input, [&] { return fmt::format("no memory for {} points", points.size()); });
 }
 
 std::string FitResult::brief() const {

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <latch>
+#include <new>
 #include <optional>
-#include <system_error>
 #include <thread>
+#include <utility>
 
 #include "host/swarm/fitter_parts.hpp"
 
@@ -41,17 +43,52 @@ class StepEvaluator final : public kernels::FitnessEvaluator {
   std::size_t fit_;
 };
 
+/// Without these words where there is no memory for them.
+tl::unexpected<kernels::Failure> failed(kernels::Failure::Kind kind, const char* words) noexcept {
+  kernels::Failure failure{kind, "no memory"};  // short enough to need none
+  try {
+    failure.message = words;
+  } catch (const std::bad_alloc&) {
+  }
+  return tl::unexpected<kernels::Failure>(std::move(failure));
+}
+
+/// What is thrown becomes a failure.
+Result<> evaluate_all(kernels::BatchEvaluator& batch, std::span<const kernels::BatchItem> items) noexcept {
+  try {
+    return batch.evaluate(items);
+  } catch (const std::bad_alloc&) {
+    return failed(kernels::Failure::Kind::out_of_memory, "no memory");
+  } catch (const std::exception& e) {
+    return failed(kernels::Failure::Kind::device, e.what());
+  }
+}
+
+/// None where there is no memory for it.
+std::optional<Fitter> assemble(const FitOptions& options, kernels::BatchEvaluator& batch, LockStep& step, std::size_t fit,
+                               const std::string& reason) noexcept {
+  try {
+    return FitterParts::assemble(options, std::make_unique<StepEvaluator>(batch, step, fit), reason);
+  } catch (const std::bad_alloc&) {
+    return std::nullopt;
+  }
+}
+
 }  // namespace
 
 LockStep::LockStep(kernels::BatchEvaluator& batch, std::size_t fits, std::size_t at_once)
     : batch_(batch), at_once_(at_once), seats_(std::make_unique<Seat[]>(fits)) {
   ready_.reserve(fits);
   waiting_.reserve(fits);
+}
+
+void LockStep::begin(std::size_t fits) noexcept {
+  const std::lock_guard lock(mutex_);
   for (std::size_t fit = 0; fit < fits; ++fit) ready_.push_back(fit);
   wake_some();
 }
 
-void LockStep::wake_some() {
+void LockStep::wake_some() noexcept {
   for (; running_ < at_once_ && !ready_.empty(); ++running_) {
     const std::size_t next = ready_.back();
     ready_.pop_back();
@@ -59,7 +96,7 @@ void LockStep::wake_some() {
   }
 }
 
-void LockStep::leave() {
+void LockStep::leave() noexcept {
   const std::lock_guard lock(mutex_);
   pass_on();
 }
@@ -76,17 +113,18 @@ Result<> LockStep::evaluate(const kernels::BatchItem& item) {
 }
 
 /// Who calls runs no more.
-void LockStep::pass_on() {
+void LockStep::pass_on() noexcept {
   --running_;
   wake_some();
   if (running_ == 0 && !waiting_.empty()) score();
 }
 
-void LockStep::score() {
-  const Result<> done = batch_.evaluate(waiting_);
+void LockStep::score() noexcept {
+  // Nothing may be thrown here: the others wait for their turn.
+  const Result<> done = evaluate_all(batch_, waiting_);
   swarms_ += waiting_.size();
   for (const kernels::BatchItem& item : waiting_) {
-    seats_[item.problem].done = done;
+    seats_[item.problem].done = done ? Result<>() : failed(done.error().kind, done.error().message.c_str());
     ready_.push_back(item.problem);
   }
   waiting_.clear();
@@ -99,28 +137,30 @@ StepReport fit_in_step(std::span<const PointsView> clouds, const FitOptions& opt
   const std::size_t at_once = threads > 0 ? static_cast<std::size_t>(threads) : std::max(1U, std::thread::hardware_concurrency());
   const std::size_t wanted = std::min(clouds.size(), batch.problems());
   std::atomic<std::size_t> next = 0;
-  std::optional<LockStep> step;
+  LockStep step(batch, wanted, at_once);
   std::latch begun(1);
-  // The threads that can be had are told to the step before any of them enters it.
-  const auto work = [&](std::size_t fit) {
+  const auto work = [&](std::size_t fit) noexcept {
     begun.wait();
-    step->enter(fit);
-    Fitter fitter = FitterParts::assemble(options, std::make_unique<StepEvaluator>(batch, *step, fit), reason);
-    for (std::size_t k = next++; k < clouds.size(); k = next++) results[k] = fitter.fit(clouds[k]);
-    step->leave();
+    step.enter(fit);
+    if (auto fitter = assemble(options, batch, step, fit, reason)) {
+      for (std::size_t k = next++; k < clouds.size(); k = next++) results[k] = fitter->fit(clouds[k]);
+    }
+    step.leave();
   };
-  std::vector<std::thread> others;
+  // The threads that can be had are told to the step before any of them enters it.
+  std::vector<std::jthread> others;
   others.reserve(wanted);
   try {
     while (others.size() + 1 < wanted) others.emplace_back(work, others.size() + 1);
-  } catch (const std::system_error&) {
+  } catch (const std::exception&) {
     // As many as there are; the caller's is one of them.
   }
-  step.emplace(batch, others.size() + 1, at_once);
+  step.begin(others.size() + 1);
   begun.count_down();
   work(0);
-  for (std::thread& thread : others) thread.join();
-  return {batch.submissions() - before, step->swarms()};
+  others.clear();  // when they have ended
+  for (std::size_t k = next; k < clouds.size(); ++k) results[k] = fail(Error::Kind::out_of_memory, "no memory");
+  return {batch.submissions() - before, step.swarms()};
 }
 
 }  // namespace swarmfit::swarm

@@ -23,13 +23,16 @@ namespace swarmfit::swarm {
 /// Keeps so many fits in step, each on a thread of its own, with the number of its problem.
 class LockStep {
  public:
-  /// `at_once`: how many of the threads may run side by side, >= 1. `batch` must outlive this, and has no fewer problems than `fits`.
+  /// Room for so many fits. `at_once`: how many of the threads may run side by side, >= 1. `batch` must outlive this, and has no fewer
+  /// problems than `fits`.
   LockStep(kernels::BatchEvaluator& batch, std::size_t fits, std::size_t at_once);
 
+  /// Once: the first so many fits are announced, and each will enter and leave.
+  void begin(std::size_t fits) noexcept;
   /// The first thing a fit's thread does: waits for its turn.
   void enter(std::size_t fit) { seats_[fit].turn.acquire(); }
   /// The last thing, for every fit that was announced.
-  void leave();
+  void leave() noexcept;
   /// Waits until all fits have asked or left; `item.problem` is the fit's. A device's failure is everybody's.
   kernels::Result<> evaluate(const kernels::BatchItem& item);
 
@@ -42,9 +45,9 @@ class LockStep {
     kernels::Result<> done;
   };
 
-  void pass_on();
-  void score();
-  void wake_some();
+  void pass_on() noexcept;
+  void score() noexcept;
+  void wake_some() noexcept;
 
   kernels::BatchEvaluator& batch_;
   std::size_t at_once_;
@@ -64,6 +67,8 @@ struct StepReport {
 /// results[k] = fit(clouds[k], options), but for its times and, on a Vulkan device, points_touched: everything is computed there. As many
 /// fits as the batch has problems are under way. `batch` is of the back end that the options ask for, `reason` says why; the options are
 /// valid and ask for neither an own model nor a time budget. So many threads run side by side on the host, 0 as many as the machine has.
+/// Fewer threads where no more can be had. A cloud that no fit could be made for has out_of_memory for its result; what runs out before
+/// any has begun is thrown.
 StepReport fit_in_step(std::span<const PointsView> clouds, const FitOptions& options, int threads, kernels::BatchEvaluator& batch,
                        const std::string& reason, std::span<Expected<FitResult>> results);
 

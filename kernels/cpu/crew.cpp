@@ -139,7 +139,7 @@ class Crew::Arena {
 // them, takes milliseconds.
 Crew::Crew(int threads)
     : helpers_(threads - 1),
-      shared_(std::make_unique<Shared>(static_cast<std::size_t>(threads))),
+      shared_(std::make_shared<Shared>(static_cast<std::size_t>(threads))),
       arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
   if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
@@ -149,10 +149,8 @@ Crew::~Crew() {
   const auto since = Clock::now();
   while (shared_->awake.load() > 0) {
     std::this_thread::yield();
-    if (Clock::now() - since < kPatience) continue;
-    // Those that TBB has found no thread for will look at it yet, should it ever find one.
-    static_cast<void>(shared_.release());
-    return;
+    // Those that TBB has found no thread for have a share in it, and see that it is closed, should it ever find one.
+    if (Clock::now() - since > kPatience) return;
   }
 }
 
@@ -161,9 +159,9 @@ void Crew::call_helpers(std::size_t wanted) {
   while (shared_->awake.load(std::memory_order_relaxed) < most) {
     shared_->awake.fetch_add(1);
     try {
-      arena_->enqueue([shared = shared_.get()] { shared->help(); });
+      arena_->enqueue([shared = shared_] { shared->help(); });
     } catch (...) {
-      shared_->awake.fetch_sub(1);  // the caller alone does it as well
+      shared_->awake.fetch_sub(1);  // the caller alone does it as well, and who comes all the same does no harm
       return;
     }
   }

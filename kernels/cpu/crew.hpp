@@ -34,7 +34,7 @@ class Crew {
   void call_helpers(std::size_t wanted);
 
   int helpers_;
-  std::unique_ptr<Shared> shared_;
+  std::shared_ptr<Shared> shared_;
   std::unique_ptr<Arena> arena_;
 };
 

@@ -15,7 +15,12 @@ namespace swarmfit::kernels::vulkan {
 template <class Work>
 std::invoke_result_t<Work> guarded(const char* what, Failure::Kind otherwise, Work&& work) noexcept {
   const auto failure = [what](Failure::Kind kind, const std::exception& e) {
-    return fail(kind, std::string("vulkan: ") + what + ": " + e.what());
+    Failure one{kind, "vulkan failed"};  // short enough to need no memory
+    try {
+      one.message = std::string("vulkan: ") + what + ": " + e.what();
+    } catch (const std::bad_alloc&) {
+    }
+    return tl::unexpected<Failure>(std::move(one));
   };
   try {
     return work();

@@ -19,7 +19,7 @@ struct Intrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;
 };
 
-/// Points in input order, perhaps on an image grid, perhaps with colour. One of `values32`, `values64` is filled: the source's own precision.
+/// Points in input order, perhaps on an image grid, perhaps with colour. One of `values32`, `values64` is filled, as precise as the source.
 struct Cloud {
   int dimension = 3;            ///< columns a point
   std::vector<float> values32;  ///< dimension x size, row after row

@@ -75,7 +75,8 @@ struct FitOptions {
 };
 
 /// Told of each model the moment it is found; `stop` ends the fit with what there is. Of a cloud that was thinned, inliers and cost are
-/// those of the thinned cloud scaled to the whole; the result has the exact ones.
+/// those of the thinned cloud scaled to the whole; the result has the exact ones. Called in the thread of the fit's caller, to whom what it
+/// throws comes back, and the fit ends.
 enum class Verdict { go_on, stop };
 using ModelCallback = std::function<Verdict(const Model&)>;
 
@@ -99,15 +100,15 @@ struct FitResult {
 /// Holds a back end; reuse it over frames. Not thread-safe; one a thread.
 class SWARMFIT_API Fitter {
  public:
-  /// Fails with invalid_option or backend_unavailable. An own model's GLSL that does not compile is an invalid_option with the compiler's
-  /// words, where the back end is a Vulkan device.
+  /// Fails with invalid_option, backend_unavailable or out_of_memory. An own model's GLSL that does not compile is an invalid_option with the
+  /// compiler's words, where the back end is a Vulkan device.
   static Expected<Fitter> create(const FitOptions& options);
   ~Fitter();
   Fitter(Fitter&&) noexcept;
   Fitter& operator=(Fitter&&) noexcept;
 
   /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension,
-  /// a coordinate beyond 1e18, an own model's function that threw).
+  /// a coordinate beyond 1e18, an own model's function that threw) or out_of_memory; what `on_model` throws comes back as it is.
   Expected<FitResult> fit(const PointsView& points, const ModelCallback& on_model = {}, std::stop_token stop = {},
                           const std::vector<Model>& warm_start = {});
 

@@ -17,7 +17,7 @@ using OwnResidual = std::function<void(std::span<const double> points, std::span
 
 /// Fitted in place of the built-in kinds with FitOptions::model = ModelType::own. D is `dimension`, P `parameter_count`; points lie row
 /// after row, D numbers each. Functions may be called from several threads at a time and must give the same answer each time. One that
-/// throws ends the fit with bad_input and what it said.
+/// throws makes the fit fail with bad_input and what it said; with out_of_memory where that is a std::bad_alloc.
 struct OwnModel {
   std::string name = "own";  ///< for messages; not empty
   int dimension = 2;         ///< D: columns of a point; 2, 3 or 4

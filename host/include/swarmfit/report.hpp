@@ -62,8 +62,8 @@ struct ReportNotes {
 /// Can this build write pages? Fails with cannot_write and what was missing when it was made.
 SWARMFIT_API Expected<> check_report();
 
-/// The whole page. Clouds of more than 300 000 finite points and large images are shown thinned, and the page says so. `load_ms`: time spent
-/// reading the input. Fails as check_report() does, or with out_of_memory.
+/// The whole page. Clouds of more than 300 000 finite points and large images are shown thinned, and the page says so. `load_ms`: time [ms]
+/// spent reading the input. Fails as check_report() does, or with out_of_memory.
 SWARMFIT_API Expected<std::string> report_page(const FitResult& result, const Cloud& input, double load_ms, const SearchRecord& search,
                                                const ReportNotes& notes);
 SWARMFIT_API Expected<std::string> report_page(const PerceiveResult& result, const Cloud& input, const SearchRecord& search,

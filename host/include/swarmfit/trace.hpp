@@ -24,7 +24,8 @@ struct SwarmStep {
   double nothing_explained = 0;  ///< fitness of a model that explains no point [data unit]
 };
 
-/// Called after each step, in the fit's own thread; what it watches is the same as without it, and slower by what it does.
+/// Called after each step, in the fit's own thread; what it watches is the same as without it, and slower by what it does. What it throws
+/// comes back to the fit's caller, and the fit ends.
 using SwarmObserver = std::function<void(const SwarmStep&)>;
 
 }  // namespace swarmfit
