@@ -91,18 +91,34 @@ PointGrid make_grid(const Cloud& frame, int threads) {
   return grid;
 }
 
-PlaneFit fit_plane(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> members, const Eigen::Vector3d& side) {
+namespace {
+
+/// at(k): the k-th of `count` points.
+template <class At>
+PlaneFit fit_plane_to(std::size_t count, const Eigen::Vector3d& side, At&& at) {
   PlaneFit fit{side, Eigen::Vector3d::Zero()};
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const auto i : members) fit.mean += points[i].cast<double>();
-  fit.mean /= static_cast<double>(members.size());
-  for (const auto i : members) {
-    const Eigen::Vector3d d = points[i].cast<double>() - fit.mean;
+  for (std::size_t k = 0; k < count; ++k) fit.mean += at(k);
+  fit.mean /= static_cast<double>(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Eigen::Vector3d d = at(k) - fit.mean;
     spread += d * d.transpose();
   }
-  fit.normal = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  fit.normal = solver.eigenvectors().col(0);
   if (fit.normal.dot(side) < 0) fit.normal = -fit.normal;
+  fit.square = std::max(solver.eigenvalues()[0], 0.0) / static_cast<double>(count);
   return fit;
+}
+
+}  // namespace
+
+PlaneFit fit_plane(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> members, const Eigen::Vector3d& side) {
+  return fit_plane_to(members.size(), side, [&](std::size_t k) -> Eigen::Vector3d { return points[members[k]].cast<double>(); });
+}
+
+PlaneFit fit_plane(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& side) {
+  return fit_plane_to(points.size(), side, [&](std::size_t k) -> const Eigen::Vector3d& { return points[k]; });
 }
 
 }  // namespace swarmfit::perception

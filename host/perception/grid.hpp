@@ -39,10 +39,13 @@ struct LocalPlane {
 /// The plane of least squares through points: their mean is on it.
 struct PlaneFit {
   Eigen::Vector3d normal, mean;
+  double square = 0;  ///< mean of the squared distances
   LocalPlane plane() const { return {normal.cast<float>(), static_cast<float>(-normal.dot(mean))}; }
 };
 /// Through those of the points that are listed, three at least; its normal is on the side of `side`.
 PlaneFit fit_plane(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> members, const Eigen::Vector3d& side);
+/// Through all of them.
+PlaneFit fit_plane(std::span<const Eigen::Vector3d> points, const Eigen::Vector3d& side);
 
 PointGrid make_grid(const Cloud& frame, int threads = 0);
 

@@ -49,28 +49,43 @@ void find_floor_below(const PointGrid& grid, std::span<const Surface> surfaces, 
   }
 }
 
-/// Grows one group from `seed` over the image grid. Points below `min_height` join but do not spread.
-class GridFlood {
+/// Grows groups. Who stands next to a member, and joins, is the `Neighbours`' to say.
+template <class Neighbours>
+class Flood {
  public:
-  GridFlood(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result)
-      : grid_(grid), surfaces_(surfaces), options_(options), result_(result), hole_(std::max(1, kHole * grid.width / 640)) {}
+  Flood(const PointGrid& grid, Popout& result) : grid_(grid), result_(result) {}
 
   bool is_seed(std::size_t i) const { return result_.standing[i].sure != 0; }
 
   /// Members of the group of `seed`, marked with `mark`.
   const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
-    members_.assign(1, static_cast<std::uint32_t>(seed));
-    result_.group[seed] = mark;
-    for (std::size_t next = 0; next < members_.size(); ++next) {
-      const std::size_t at = members_[next];
-      if (!is_seed(at)) continue;
-      spread(at, mark);
-    }
+    members_.clear();
+    join(static_cast<std::uint32_t>(seed), mark);
+    for (std::size_t next = 0; next < members_.size(); ++next) static_cast<Neighbours*>(this)->spread(members_[next], mark);
     return members_;
   }
 
+ protected:
+  void join(std::uint32_t point, std::uint16_t mark) {
+    result_.group[point] = mark;
+    members_.push_back(point);
+  }
+
+  const PointGrid& grid_;
+  Popout& result_;
+
  private:
+  std::vector<std::uint32_t> members_;
+};
+
+/// Over the image grid. Points below `min_height` join but do not spread.
+class GridFlood : public Flood<GridFlood> {
+ public:
+  GridFlood(const PointGrid& grid, std::span<const Surface> surfaces, const PopoutOptions& options, Popout& result)
+      : Flood(grid, result), surfaces_(surfaces), options_(options), hole_(std::max(1, kHole * grid.width / 640)) {}
+
   void spread(std::size_t at, std::uint16_t mark) {
+    if (!is_seed(at)) return;
     const auto width = static_cast<std::uint32_t>(grid_.width);
     const int u = static_cast<int>(static_cast<std::uint32_t>(at) % width), v = static_cast<int>(static_cast<std::uint32_t>(at) / width);
     const auto& p = grid_.points[at];
@@ -83,8 +98,7 @@ class GridFlood {
       if (result_.group[to] == mark) return is_seed(to);
       if (result_.standing[to].surface != above || result_.group[to] != 0) return false;
       if ((grid_.points[to] - p).squaredNorm() > step * step || (across_hole && !is_seed(to))) return false;
-      result_.group[to] = mark;
-      members_.push_back(static_cast<std::uint32_t>(to));
+      join(static_cast<std::uint32_t>(to), mark);
       return is_seed(to);
     };
     for (int dv = -1; dv <= 1; ++dv)
@@ -95,37 +109,27 @@ class GridFlood {
       }
   }
 
-  const PointGrid& grid_;
+ private:
   std::span<const Surface> surfaces_;
   const PopoutOptions& options_;
-  Popout& result_;
   int hole_;  // [px]
-  std::vector<std::uint32_t> members_;
 };
 
-/// The same without an image grid: neighbours come from a hash of voxels one step wide.
-class VoxelFlood {
+/// Without an image grid: neighbours come from a hash of voxels one step wide.
+class VoxelFlood : public Flood<VoxelFlood> {
  public:
   VoxelFlood(const PointGrid& grid, const PopoutOptions& options, Popout& result)
-      : grid_(grid), result_(result), step_(static_cast<float>(options.flood_step)) {
+      : Flood(grid, result), step_(static_cast<float>(options.flood_step)) {
     for (std::size_t i = 0; i < grid.size(); ++i)
       if (is_seed(i)) voxels_[key(cell(grid.points[i]))].push_back(static_cast<std::uint32_t>(i));
   }
 
-  bool is_seed(std::size_t i) const { return result_.standing[i].sure != 0; }
-
-  const std::vector<std::uint32_t>& grow(std::size_t seed, std::uint16_t mark) {
-    members_.assign(1, static_cast<std::uint32_t>(seed));
-    result_.group[seed] = mark;
-    for (std::size_t next = 0; next < members_.size(); ++next) {
-      const std::size_t at = members_[next];
-      const auto& p = grid_.points[at];
-      const Eigen::Vector3i c = cell(p);
-      for (int dz = -1; dz <= 1; ++dz)
-        for (int dy = -1; dy <= 1; ++dy)
-          for (int dx = -1; dx <= 1; ++dx) visit(p, c + Eigen::Vector3i(dx, dy, dz), at, mark);
-    }
-    return members_;
+  void spread(std::size_t at, std::uint16_t mark) {
+    const auto& p = grid_.points[at];
+    const Eigen::Vector3i c = cell(p);
+    for (int dz = -1; dz <= 1; ++dz)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) visit(p, c + Eigen::Vector3i(dx, dy, dz), at, mark);
   }
 
  private:
@@ -138,8 +142,7 @@ class VoxelFlood {
     for (const auto to : points) {
       if (result_.group[to] != 0) continue;
       if (result_.standing[to].surface == result_.standing[at].surface && (grid_.points[to] - p).squaredNorm() <= step_ * step_) {
-        result_.group[to] = mark;
-        members_.push_back(to);
+        join(to, mark);
         continue;
       }
       points[kept++] = to;
@@ -152,11 +155,8 @@ class VoxelFlood {
     return part(c.x()) << 42 | part(c.y()) << 21 | part(c.z());
   }
 
-  const PointGrid& grid_;
-  Popout& result_;
   float step_;
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> voxels_;
-  std::vector<std::uint32_t> members_;
 };
 
 /// Along the edge of the surface, and long: the wall behind a table, its rim, a bench beside it.

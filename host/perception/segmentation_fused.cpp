@@ -7,11 +7,11 @@
 #include <numeric>
 #include <optional>
 
-#include <Eigen/Eigenvalues>
 #include <opencv2/imgproc.hpp>
 
 #include "host/common/graph_cut.hpp"
 #include "host/common/parallel.hpp"
+#include "host/perception/grid.hpp"
 #include "host/perception/segmentation_grid.hpp"
 
 namespace swarmfit::perception {
@@ -35,7 +35,7 @@ const std::vector<double>& contrast_table() {
 }
 
 /// The supporting plane as seen within one SOI: its own points, fitted anew, tell height from noise better than the whole plane does.
-struct LocalPlane {
+struct SoiPlane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset = 0, sigma = 0;
   double height(const Eigen::Vector3d& x) const { return normal.dot(x) + offset; }
@@ -145,7 +145,7 @@ class FusedCut {
     return near_strange;
   }
 
-  std::optional<LocalPlane> fit_plane(const SoiRegion& region) const {
+  std::optional<SoiPlane> plane_within(const SoiRegion& region) const {
     const int plane = input_.sois[region.label - 1U].plane;
     std::vector<Eigen::Vector3d> points;
     Eigen::Vector3d group = Eigen::Vector3d::Zero();
@@ -163,27 +163,15 @@ class FusedCut {
         }
       }
     if (points.size() < 100 || group_size == 0) return std::nullopt;
-    LocalPlane fitted{};
+    const Eigen::Vector3d inside = group / static_cast<double>(group_size);
+    SoiPlane fitted{};
     // Twice: what lies off the first fit is left out of the second.
     for (int round = 0; round < 2; ++round) {
-      Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-      Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-      double count = 0, square = 0;
-      const auto kept = [&](const Eigen::Vector3d& x) { return round == 0 || std::abs(fitted.height(x)) < 2.5 * fitted.sigma; };
-      for (const auto& x : points)
-        if (kept(x)) {
-          mean += x;
-          ++count;
-        }
-      mean /= count;
-      for (const auto& x : points)
-        if (kept(x)) spread += (x - mean) * (x - mean).transpose();
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-      square = std::max(solver.eigenvalues()[0], 0.0) / count;
-      const Eigen::Vector3d normal = solver.eigenvectors().col(0);
-      fitted = {normal, -normal.dot(mean), std::max(std::sqrt(square), 1e-4)};
+      if (round > 0) std::erase_if(points, [&](const Eigen::Vector3d& x) { return !(std::abs(fitted.height(x)) < 2.5 * fitted.sigma); });
+      const PlaneFit fit = perception::fit_plane(points, fitted.normal);
+      fitted = {fit.normal, -fit.normal.dot(fit.mean), std::max(std::sqrt(fit.square), 1e-4)};
     }
-    if (fitted.height(group / static_cast<double>(group_size)) < 0) fitted = {-fitted.normal, -fitted.offset, fitted.sigma};
+    if (fitted.height(inside) < 0) fitted = {-fitted.normal, -fitted.offset, fitted.sigma};
     return fitted;
   }
 
@@ -192,7 +180,7 @@ class FusedCut {
     planes_.resize(regions_.size());
     for_regions([&](std::size_t k) {
       const SoiRegion& region = regions_[k];
-      planes_[k] = fit_plane(region);
+      planes_[k] = plane_within(region);
       SoiColours colours = soi_colours(input_, grid_, region, options_.colour_neighbours, 4, tuning_.largest_sample);
       const auto for_candidates = [&](const auto& body) {
         for (int y = 0; y < region.rect.height; ++y)
@@ -342,7 +330,7 @@ class FusedCut {
   }
 
   /// Of the pixel and its neighbours that are in no group: noise, but not a step, goes away.
-  double mean_height(const LocalPlane& plane, std::size_t i) const {
+  double mean_height(const SoiPlane& plane, std::size_t i) const {
     const int u = static_cast<int>(i % static_cast<std::size_t>(grid_.width())),
               v = static_cast<int>(i / static_cast<std::size_t>(grid_.width()));
     double sum = 0, count = 0;
@@ -368,7 +356,7 @@ class FusedCut {
   std::vector<std::uint16_t> labels_;
   std::vector<int> node_;            // one a pixel: its node, kFixed or kOutside
   std::vector<std::size_t> active_;  // one a node: its pixel
-  std::vector<std::optional<LocalPlane>> planes_;
+  std::vector<std::optional<SoiPlane>> planes_;
   std::vector<Candidate> candidates_;         // node by node
   std::vector<std::size_t> first_candidate_;  // of each node
   std::vector<PairRange> pairs_;

@@ -50,12 +50,8 @@ struct Layout {
 
 class VulkanColourCosts final : public ColourCosts {
  public:
-  VulkanColourCosts(Instance instance, vk::raii::PhysicalDevice physical, const EvaluatorOptions& options)
-      : instance_(std::move(instance)),
-        physical_(std::move(physical)),
-        device_(physical_, options),
-        layout_(device_),
-        identity_{"vulkan", device_.traits().name} {}
+  VulkanColourCosts(Opened opened, const EvaluatorOptions& options)
+      : opened_(std::move(opened)), device_(opened_.physical, options), layout_(device_), identity_{"vulkan", device_.traits().name} {}
 
   const Identity& identity() const noexcept override { return identity_; }
 
@@ -127,8 +123,7 @@ class VulkanColourCosts final : public ColourCosts {
     std::copy_n(done.begin(), costs.size(), costs.begin());
   }
 
-  Instance instance_;
-  vk::raii::PhysicalDevice physical_;
+  Opened opened_;
   Device device_;
   Layout layout_;
   Identity identity_;
@@ -142,13 +137,9 @@ class VulkanColourCosts final : public ColourCosts {
 
 Result<std::unique_ptr<ColourCosts>> make_vulkan_colour_costs(const EvaluatorOptions& options, std::string_view device) {
   return vulkan::guarded("opening a device", Failure::Kind::unavailable, [&]() -> Result<std::unique_ptr<ColourCosts>> {
-    vulkan::Instance instance(options);
-    for (vk::raii::PhysicalDevice& physical : instance.devices()) {
-      const std::string name = physical.getProperties().deviceName.data();
-      if (!vulkan::obstacle(physical).empty() || (!device.empty() && name != device)) continue;
-      return std::make_unique<vulkan::VulkanColourCosts>(std::move(instance), std::move(physical), options);
-    }
-    return fail(Failure::Kind::unavailable, fmt::format("vulkan device is '{}', and no such device can be used", device));
+    auto opened = vulkan::open_device(options, device);
+    if (!opened) return tl::unexpected(opened.error());
+    return std::make_unique<vulkan::VulkanColourCosts>(std::move(*opened), options);
   });
 }
 
