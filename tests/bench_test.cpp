@@ -88,6 +88,7 @@ TEST(Bench, RefusesOptionsOutOfBounds) {
   };
   expect_refused(with([](BenchOptions& o) { o.points = {0}; }), Error::Kind::invalid_option, "points", "0");
   expect_refused(with([](BenchOptions& o) { o.particles = {1}; }), Error::Kind::invalid_option, "particles", "1");
+  EXPECT_TRUE(BenchOptions{}.validate());
   expect_refused(with([](BenchOptions& o) { o.threads = -1; }), Error::Kind::invalid_option, "threads", "-1");
   expect_refused(with([](BenchOptions& o) { o.seconds = 0; }), Error::Kind::invalid_option, "seconds", "0");
   expect_refused(with([](BenchOptions& o) { o.seconds = std::numeric_limits<double>::quiet_NaN(); }), Error::Kind::invalid_option,

@@ -400,7 +400,7 @@ TEST(FitOptions, EachBoundIsChecked) {
   EXPECT_EQ(message([](FitOptions& o) { o.iterations = 0; }), "iterations is 0, must be >= 1");
   EXPECT_EQ(message([](FitOptions& o) { o.stall = 0; }), "stall is 0, must be >= 1");
   EXPECT_EQ(message([](FitOptions& o) { o.lambda = 0; }), "lambda is 0, must be finite and > 0");
-  EXPECT_EQ(message([](FitOptions& o) { o.time_budget_ms = -1; }), "time-budget is -1, must be finite and >= 0 ms");
+  EXPECT_EQ(message([](FitOptions& o) { o.time_budget_ms = -1; }), "time_budget_ms is -1, must be finite and >= 0 ms");
   EXPECT_EQ(message([](FitOptions& o) { o.threads = -1; }), "threads is -1, must be in [0, 4096]");
   EXPECT_NE(message([](FitOptions& o) { o.prior = DirectionPrior{Eigen::Vector3d::Zero(), 0.1}; }), "");
   EXPECT_NE(message([](FitOptions& o) { o.prior = DirectionPrior{Eigen::Vector3d::UnitX(), 0}; }), "");

@@ -35,11 +35,12 @@ TEST(PerceiveOptions, EachFieldHasABound) {
   for (const double bad : {0.99, nan, inf}) expect_invalid(with([&](auto& o) { o.soi_margin = bad; }), "soi_margin", ">= 1");
   for (const double bad : {-0.1, 1.0, nan}) expect_invalid(with([&](auto& o) { o.uncertain_cost = bad; }), "uncertain_cost", "[0, 1)");
   for (const double bad : {-1.0, nan, inf}) expect_invalid(with([&](auto& o) { o.smoothness = bad; }), "smoothness", ">= 0");
-  for (const double bad : {2.0, nan}) expect_invalid(with([&](auto& o) { o.camera_tilt = bad; }), "camera-tilt", "[-pi/2, pi/2]");
+  for (const double bad : {2.0, nan}) expect_invalid(with([&](auto& o) { o.camera_tilt = bad; }), "camera_tilt", "[-pi/2, pi/2]");
   expect_invalid(with([&](auto& o) { o.colour_neighbours = -1; }), "colour_neighbours", ">= 0");
   expect_invalid(with([&](auto& o) { o.gravity = Eigen::Vector3d::Zero(); }), "gravity", "not zero");
   expect_invalid(with([&](auto& o) { o.gravity = Eigen::Vector3d(0, nan, 1); }), "gravity", "finite");
   expect_invalid(with([&](auto& o) { o.fit.model = ModelType::line2d; }), "model", "plane");
+  expect_invalid(with([&](auto& o) { o.fit.rivals = {ModelType::sphere}; }), "fit.rivals", "empty");
   expect_invalid(with([&](auto& o) { o.fit.threshold = -1; }), "threshold", "> 0");
 }
 
@@ -48,7 +49,7 @@ TEST(PerceiveOptions, OneSourceOfTheVertical) {
   options.gravity = Eigen::Vector3d(0, 1, 0);
   options.camera_tilt = 0.5;
   ASSERT_FALSE(options.validate());
-  EXPECT_NE(options.validate().error().message.find("gravity and camera-tilt"), std::string::npos);
+  EXPECT_NE(options.validate().error().message.find("gravity and camera_tilt"), std::string::npos);
 }
 
 }  // namespace

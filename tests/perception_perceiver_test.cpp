@@ -212,6 +212,27 @@ TEST(Perceiver, WhatCannotBeUsedIsAnswered) {
   EXPECT_NE(result.error().message.find("2 columns"), std::string::npos) << result.error().message;
 }
 
+TEST(Perceiver, AFrameWhoseListsDoNotAgreeIsRefused) {
+  auto perceiver = Perceiver::create({});
+  ASSERT_TRUE(perceiver);
+  const Cloud whole = test::render_table({}, 0.001, 32, 24).cloud;
+  ASSERT_TRUE(whole.validate());
+  const auto refused = [&](auto change) {
+    Cloud frame = whole;
+    change(frame);
+    const auto result = perceiver->perceive(frame);
+    return result                                          ? std::string("taken")
+           : result.error().kind == Error::Kind::bad_input ? result.error().message
+                                                           : std::string("otherwise");
+  };
+  EXPECT_EQ(refused([](Cloud& c) { c.width = 640; }), "cloud.width is 640, must be its 768 points over its height, 24");
+  EXPECT_EQ(refused([](Cloud& c) { c.values32.resize(300); }), "cloud.width is 32, must be its 100 points over its height, 24");
+  EXPECT_EQ(refused([](Cloud& c) { c.values32.pop_back(); }), "cloud.values is 2303, must be a multiple of its dimension, 3");
+  EXPECT_EQ(refused([](Cloud& c) { c.rgb.resize(768); }), "cloud.rgb.size() is 768, must be 0 or 2304, 3 a point");
+  EXPECT_EQ(refused([](Cloud& c) { c.values64.resize(3); }), "cloud.values64.size() is 3, must be 0 where values32 is filled");
+  EXPECT_EQ(refused([](Cloud& c) { c.dimension = 0; }), "cloud.dimension is 0, must be 2, 3 or 4");
+}
+
 TEST(Perceiver, TinyFramesDoNotCrash) {
   for (const int size : {2, 3, 5, 9, 17, 33}) {
     const auto scene = test::render_table(kBoxes, 0.0015, size, size);

@@ -29,24 +29,6 @@ using Clock = std::chrono::steady_clock;
 constexpr double kLimitSeconds = 0.05;
 constexpr std::size_t kLeastRepetitions = 3;
 
-Expected<> check(const BenchOptions& options) {
-  const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
-  for (const std::size_t n : options.points) {
-    if (n < 1) return invalid(fmt::format("points is {}, must be >= 1", n));
-  }
-  for (const std::size_t m : options.particles) {
-    if (m < 2 || m > 1'000'000) return invalid(fmt::format("particles is {}, must be in [2, 1000000]", m));
-  }
-  if (options.threads < 0 || options.threads > 4096) return invalid(fmt::format("threads is {}, must be in [0, 4096]", options.threads));
-  if (!(options.seconds > 0 && std::isfinite(options.seconds))) {
-    return invalid(fmt::format("seconds is {}, must be finite and > 0", options.seconds));
-  }
-  if (options.points.empty()) return invalid("points is empty, must hold a count");
-  if (options.particles.empty()) return invalid("particles is empty, must hold a count");
-  if (options.pruning.empty()) return invalid("pruning is empty, must hold on or off");
-  return {};
-}
-
 std::vector<std::string> usable_backends() {
   std::vector<std::string> names;
   for (const kernels::DeviceDescription& device : kernels::list_devices()) {
@@ -213,9 +195,25 @@ swarm::Rows finite_rows(const PointsView& cloud) {
 
 }  // namespace
 
+Expected<> BenchOptions::validate() const {
+  const auto invalid = [](std::string message) { return fail(Error::Kind::invalid_option, std::move(message)); };
+  for (const std::size_t n : points) {
+    if (n < 1) return invalid(fmt::format("points is {}, must be >= 1", n));
+  }
+  for (const std::size_t m : particles) {
+    if (m < 2 || m > 1'000'000) return invalid(fmt::format("particles is {}, must be in [2, 1000000]", m));
+  }
+  if (threads < 0 || threads > 4096) return invalid(fmt::format("threads is {}, must be in [0, 4096]", threads));
+  if (!(seconds > 0 && std::isfinite(seconds))) return invalid(fmt::format("seconds is {}, must be finite and > 0", seconds));
+  if (points.empty()) return invalid("points is empty, must hold a count");
+  if (particles.empty()) return invalid("particles is empty, must hold a count");
+  if (pruning.empty()) return invalid("pruning is empty, must hold on or off");
+  return {};
+}
+
 Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud,
                             const std::function<void(const std::string&)>& progress) try {
-  if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
+  if (auto ok = options.validate(); !ok) return tl::unexpected(ok.error());
   const std::vector<std::string> backends = options.backends.empty() ? usable_backends() : options.backends;
   for (const std::string& backend : backends) {
     // An unknown name is told before anything is timed.

@@ -112,6 +112,7 @@ Expected<LearntView> learn_image(const fs::path& gallery, const std::string& nam
 
 Expected<LearntView> learn_object(const fs::path& gallery, const std::string& name, const Cloud& frame, const PerceiveResult& result,
                                   std::size_t object) try {
+  if (auto ok = frame.validate(); !ok) return tl::unexpected(ok.error());
   const auto mask = object_mask(frame, result, object);
   if (!mask) return tl::unexpected(mask.error());
   const cv::Mat rgb(frame.height, frame.width, CV_8UC3, const_cast<std::uint8_t*>(frame.rgb.data()));  // only read

@@ -30,13 +30,17 @@ Expected<> PerceiveOptions::validate() const {
   if (fit.noise != Noise::none) {
     return fail(Error::Kind::invalid_option, "fit.noise is depth, must be none: perception has its own measure of a depth's noise");
   }
-  if (gravity && camera_tilt) return fail(Error::Kind::invalid_option, "gravity and camera-tilt are both given, must be one of them");
+  if (!fit.rivals.empty()) {
+    return fail(Error::Kind::invalid_option,
+                fmt::format("fit.rivals is {}, must be empty: perception looks for planes", name(fit.rivals.front())));
+  }
+  if (gravity && camera_tilt) return fail(Error::Kind::invalid_option, "gravity and camera_tilt are both given, must be one of them");
   if (gravity) {
     if (auto ok = check_gravity(*gravity); !ok) return ok;
   }
   Expected<> checks[] = {
       require(fit.model == ModelType::plane, "model", name(fit.model), "plane"),
-      require(!camera_tilt || std::abs(*camera_tilt) <= kHalfPi, "camera-tilt", camera_tilt.value_or(0), "in [-pi/2, pi/2] rad"),
+      require(!camera_tilt || std::abs(*camera_tilt) <= kHalfPi, "camera_tilt", camera_tilt.value_or(0), "in [-pi/2, pi/2] rad"),
       require(horizontal_angle > 0 && horizontal_angle < kHalfPi, "horizontal_angle", horizontal_angle, "in (0, pi/2) rad"),
       require(min_plane_share > 0 && min_plane_share < 1, "min_plane_share", min_plane_share, "in (0, 1)"),
       require(positive(min_height), "min_height", min_height, "finite and > 0 m"),

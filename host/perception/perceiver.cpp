@@ -239,6 +239,7 @@ Expected<Perceiver> Perceiver::create(const PerceiveOptions& options) try {
 void Perceiver::observe(SwarmObserver observer) { state_->observer = std::move(observer); }
 
 Expected<PerceiveResult> Perceiver::perceive(const Cloud& frame, const ModelCallback& on_plane, std::stop_token stop) try {
+  if (auto ok = frame.validate(); !ok) return tl::unexpected(ok.error());
   if (frame.dimension != 3)
     return fail(Error::Kind::bad_input, fmt::format("the cloud has {} columns, must have 3 to perceive", frame.dimension));
   Stopwatch whole, stage;

@@ -97,8 +97,8 @@ Expected<> FitOptions::validate() const {
       require(!iterations || *iterations >= 1, "iterations", iterations.value_or(0), ">= 1"),
       require(!stall || *stall >= 1, "stall", stall.value_or(0), ">= 1"),
       require(!lambda || positive(*lambda), "lambda", lambda.value_or(0), "finite and > 0"),
-      require(max_models <= 65534, "max-models", max_models, "<= 65534"),
-      require(time_budget_ms >= 0 && std::isfinite(time_budget_ms), "time-budget", time_budget_ms, "finite and >= 0 ms"),
+      require(max_models <= 65534, "max_models", max_models, "<= 65534"),
+      require(time_budget_ms >= 0 && std::isfinite(time_budget_ms), "time_budget_ms", time_budget_ms, "finite and >= 0 ms"),
       require(threads >= 0 && threads <= 4096, "threads", threads, "in [0, 4096]"),
       require(!backend.empty(), "backend", "''", "a name"),
   };

@@ -119,7 +119,7 @@ struct Crew::Shared {
       if (looks > kLooks) std::this_thread::yield();
     }
     shares[own].taken.clear(std::memory_order_release);
-    awake.fetch_sub(1);  // the last that it may touch: whoever waits for this ends what it belongs to
+    awake.fetch_sub(1);  // who waits for this ends the arena
   }
 };
 

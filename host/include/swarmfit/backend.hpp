@@ -26,6 +26,7 @@ struct Device {
   std::vector<std::pair<std::string, std::string>> limits;
 };
 
+/// All of them, those that cannot be used included: the processor, Vulkan devices, the reference.
 SWARMFIT_API std::vector<Device> devices();
 
 }  // namespace swarmfit

@@ -36,13 +36,16 @@ struct Cloud {
     return values64.empty() ? PointsView(std::span<const float>(values32), dimension)
                             : PointsView(std::span<const double>(values64), dimension);
   }
+  /// Do its lists and its size agree? Fails with bad_input, naming the field, its value and its bound.
+  SWARMFIT_API Expected<> validate() const;
 };
 
 /// .pcd, .ply, .xyz, or .csv (`x,y`, `x,y,z` or `x1,y1,x2,y2`; header optional; a column named `label` is ignored), by the file's
 /// extension. Fails with bad_input.
 SWARMFIT_API Expected<Cloud> read_cloud(const std::filesystem::path& file);
 
-/// A 16-bit depth PNG to an organised cloud: z = value * depth_scale [m], 0 is a hole (NaN).
+/// A 16-bit depth PNG to an organised cloud: z = value * depth_scale [m], 0 is a hole (NaN). Fails with invalid_option (intrinsics, a depth
+/// scale that is not > 0) or bad_input, as the two below do.
 SWARMFIT_API Expected<Cloud> read_depth(const std::filesystem::path& depth, const Intrinsics& intrinsics, double depth_scale);
 
 /// A colour image registered to a depth image of the same size.

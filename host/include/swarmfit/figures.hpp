@@ -19,7 +19,7 @@ struct Figure {
 };
 
 /// Figures 2, 3 and 6 are one swarm of preset paper on one line among outliers, figure 7 is preset fast on several: SVG. Scenes and swarms
-/// follow from the seed; the work is done on the CPU back end.
+/// follow from the seed; the work is done on the CPU back end. Fails with out_of_memory.
 SWARMFIT_API Expected<std::vector<Figure>> paper_figures(std::uint64_t seed = 1);
 
 /// Figures 4 and 5, and what segmentation with fixation sees, of one organised coloured frame: JPEG. Planes and what sticks out of them are

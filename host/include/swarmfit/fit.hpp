@@ -29,6 +29,7 @@ enum class Deflation {
   residual,    ///< each point's cap sinks with what has been explained of it
   parametric,  ///< Eq. (5): fitness lessened around the parameters of found models
 };
+/// What a point costs at a distance d: min(d, cap), or the same squared.
 enum class Loss { truncated_l1, truncated_l2 };
 
 /// How far off a point may be by its sensor's noise. Each point's own threshold follows.
@@ -53,19 +54,19 @@ struct FitOptions {
   Noise noise = Noise::none;        ///< depth: of 3 columns only; tau is for the near end, beyond three tenths of the points
                                     ///< it grows with the square of the depth
   Preset preset = Preset::fast;     ///< decides every option below that is left empty
-  std::optional<int> particles;     ///< M, >= 2
+  std::optional<int> particles;     ///< M, in [2, 1000000]
   std::optional<int> iterations;    ///< most steps of one swarm, >= 1
   std::optional<int> stall;         ///< s: converged when the global best has not moved for s steps, >= 1
   std::optional<Deflation> deflation;
   std::optional<double> lambda;  ///< Eq. (5), > 0
   std::optional<Loss> loss;
   std::size_t min_inliers = 0;  ///< 0: decided from the data
-  std::size_t max_models = 0;   ///< 0: no bound
-  double time_budget_ms = 0;    ///< 0: none; what is found by then is valid
+  std::size_t max_models = 0;   ///< at most 65534; 0: no bound
+  double time_budget_ms = 0;    ///< >= 0; 0: none; what is found by then is valid
   std::optional<DirectionPrior> prior;
   std::uint64_t seed = 1;
   std::string backend = "auto";  ///< auto, cpu, vulkan, reference, or part of a device's name
-  int threads = 0;               ///< of the CPU back end; 0 takes all
+  int threads = 0;               ///< of the CPU back end, in [0, 4096]; 0 takes all
   std::string pipeline_cache;    ///< folder for compiled Vulkan pipelines; empty keeps none
 
   /// `model` and its rivals.
@@ -128,7 +129,7 @@ class SWARMFIT_API Fitter {
   std::unique_ptr<State> state_;
 };
 
-/// One call for one cloud.
+/// One call for one cloud. Fails as Fitter::create() and Fitter::fit() do.
 SWARMFIT_API Expected<FitResult> fit(const PointsView& points, const FitOptions& options = {}, const ModelCallback& on_model = {});
 
 }  // namespace swarmfit
