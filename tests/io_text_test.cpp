@@ -38,6 +38,15 @@ TEST(Xyz, PlainAndColoured) {
   EXPECT_EQ(unit->rgb, (std::vector<std::uint8_t>{255, 128, 0}));
 }
 
+TEST(Xyz, NormalsAreNoColours) {
+  const TemporaryFolder folder;
+  const auto cloud = read_cloud(folder.put("a.xyz", "0 0 1 0 0 1\n0 1 1 0.6 0 -0.8\n1 0 1 nan nan nan\n"));
+  ASSERT_TRUE(cloud) << cloud.error().message;
+  EXPECT_EQ(cloud->values64, (std::vector<double>{0, 0, 1, 0, 1, 1, 1, 0, 1}));
+  EXPECT_FALSE(cloud->coloured());
+  expect_complaint(folder.put("b.xyz", "0 0 1 0 0 -1\n0 0 2 0 0 2\n"), "colour b: -1, must be in 0..255");
+}
+
 TEST(Xyz, Faults) {
   const TemporaryFolder folder;
   expect_complaint(folder.put("a.xyz", "1 2\n"), "2 columns");

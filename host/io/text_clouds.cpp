@@ -1,6 +1,7 @@
 // XYZ (blanks between values) and CSV (commas). Text keeps its digits: values are doubles.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -20,6 +21,13 @@ Expected<> finish(const std::filesystem::path& file, Cloud& cloud) {
   cloud.width = static_cast<int>(cloud.size());
   cloud.height = 1;
   return {};
+}
+
+/// Are three more columns normals? No colour is below zero, and no normal longer than one.
+bool are_normals(const std::vector<double>& values) {
+  constexpr double kLongest = 1.001;  // rounded
+  return std::any_of(values.begin(), values.end(), [](double v) { return v < 0; }) &&
+         std::none_of(values.begin(), values.end(), [](double v) { return std::abs(v) > kLongest; });
 }
 
 /// Colours are whole numbers in 0..255, or all in 0..1.
@@ -122,21 +130,22 @@ Expected<> read_csv_row(const std::filesystem::path& file, std::size_t line_numb
 }  // namespace
 
 Expected<Cloud> read_xyz(const std::filesystem::path& file, const FileBytes& bytes) {
+  static constexpr const char* kRows = "must be x y z, and perhaps r g b or a normal";
   Cloud cloud;
-  std::vector<double> colours;
+  std::vector<double> colours;  // or normals
   std::size_t width = 0;
   TextCursor cursor(bytes.text());
   while (cursor.next_line()) {
     double row[6] = {};
     std::size_t n = 0;
     for (auto token = cursor.token(); !token.empty(); token = cursor.token(), ++n) {
-      if (n == 6) return bad_input(file, "line {}: more than 6 columns, must be x y z or x y z r g b", cursor.line_number());
+      if (n == 6) return bad_input(file, "line {}: more than 6 columns, {}", cursor.line_number(), kRows);
       if (!parse_number(token, row[n])) {
         return bad_input(file, "line {}, column {}: {} is not a number in range", cursor.line_number(), n + 1, excerpt(token));
       }
     }
     if (width == 0) {
-      if (n != 3 && n != 6) return bad_input(file, "line {}: {} columns, must be x y z or x y z r g b", cursor.line_number(), n);
+      if (n != 3 && n != 6) return bad_input(file, "line {}: {} columns, {}", cursor.line_number(), n, kRows);
       width = n;
     }
     if (n != width) return bad_input(file, "line {}: {} columns, must be {} as in the first line", cursor.line_number(), n, width);
@@ -144,7 +153,7 @@ Expected<Cloud> read_xyz(const std::filesystem::path& file, const FileBytes& byt
     if (n == 6) colours.insert(colours.end(), row + 3, row + 6);
   }
   if (auto ok = finish(file, cloud); !ok) return tl::unexpected(ok.error());
-  if (!colours.empty()) {
+  if (!colours.empty() && !are_normals(colours)) {
     if (auto ok = set_colours(file, colours, cloud); !ok) return tl::unexpected(ok.error());
   }
   return cloud;
