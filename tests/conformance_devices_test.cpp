@@ -5,8 +5,10 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <string>
 
 #include "conformance.hpp"
+#include "tests/io_files.hpp"
 
 namespace swarmfit::kernels::conformance {
 namespace {
@@ -190,8 +192,8 @@ TEST_P(VulkanDevices, UnknownNamesAreErrors) {
 
 TEST_P(VulkanDevices, ThePipelineCacheIsKeptAndNeverTrusted) {
   namespace fs = std::filesystem;
-  const fs::path folder = fs::path(testing::TempDir()) / "swarmfit-pipelines" / "inner";
-  fs::remove_all(folder);
+  const tests::TemporaryFolder outer;
+  const fs::path folder = outer / "inner";
   EvaluatorOptions options = GetParam().options;
   options.pipeline_cache = folder;
   const Cloud cloud = make_cloud(ModelKind::plane, 500);
@@ -215,13 +217,18 @@ TEST_P(VulkanDevices, ThePipelineCacheIsKeptAndNeverTrusted) {
     std::ifstream again(file, std::ios::binary);
     EXPECT_EQ(std::string(std::istreambuf_iterator<char>(again), {}), good) << "not mended";
   }
-  fs::remove_all(folder.parent_path());
 }
 
 TEST_P(VulkanDevices, MissingValidationIsAnError) {
+  const char* given = std::getenv("VK_LAYER_PATH");
+  const std::string before = given == nullptr ? "" : given;  // the tests that follow may need it
   setenv("VK_LAYER_PATH", "/nowhere", 1);
   const auto made = make_vulkan_evaluator(GetParam().options, "");
-  unsetenv("VK_LAYER_PATH");
+  if (given == nullptr) {
+    unsetenv("VK_LAYER_PATH");
+  } else {
+    setenv("VK_LAYER_PATH", before.c_str(), 1);
+  }
   ASSERT_FALSE(made);
   EXPECT_EQ(made.error().kind, Failure::Kind::unavailable);
   EXPECT_NE(made.error().message.find("VK_LAYER_KHRONOS_validation"), std::string::npos) << made.error().message;

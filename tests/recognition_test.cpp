@@ -12,25 +12,16 @@
 #include <swarmfit/scene.hpp>
 
 #include "host/perception/scene_solids.hpp"
+#include "tests/io_files.hpp"
 
 namespace swarmfit::perception {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of its own for each test, gone with it.
+/// A gallery's folder of its own for each test.
 class RecognitionTest : public testing::Test {
  protected:
-  RecognitionTest() {
-    const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = fs::temp_directory_path() / (std::string("swarmfit-recognition-") + test->name());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-  }
-  ~RecognitionTest() override {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
   void store(const std::string& name, const cv::Mat& image) const {
     fs::create_directories((folder_ / name).parent_path());
     ASSERT_TRUE(cv::imwrite((folder_ / name).string(), image));
@@ -40,7 +31,12 @@ class RecognitionTest : public testing::Test {
     EXPECT_TRUE(loaded) << loaded.error().message;
     return std::move(*loaded);
   }
-  fs::path folder_;
+
+ private:
+  const tests::TemporaryFolder temporary_;
+
+ protected:
+  const fs::path folder_ = temporary_.path();
 };
 
 /// A printed surface of its own: blocks and discs in random greys.
