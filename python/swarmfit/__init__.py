@@ -94,8 +94,8 @@ _FIT_OPTIONS = """
         threshold: inliers are within this distance, in the data's unit; "auto" takes it from the data's own noise.
             Default 0.01 for planes, spheres and cylinders, 6 px for homographies, 2.5 px for fundamental matrices, else "auto".
         noise: "none"; "depth" lets the threshold grow with the square of the depth |z|, as the noise of depth cameras and stereo
-            does; it is that of the near end, up to the |z| that three points in ten do not reach, and estimated where none is given. For points of 3 columns in the camera's frame, and not
-            for perceive().
+            does; it is that of the near end, up to the |z| that three points in ten do not reach, and estimated where none is given.
+            For points of 3 columns in the camera's frame, and not for perceive().
         backend: "auto", "cpu", "vulkan", "reference", or part of a device's name; see devices().
         threads: of the CPU back end; 0 takes all.
         seed: the same seed gives the same answer, on any number of threads.
