@@ -27,7 +27,20 @@ struct Outcome {
   std::string out, err;
 };
 
-/// One run of a program, words[0], in a folder of its own; `interrupt_after` sends it a Ctrl-C.
+/// Comes back when a child is ready for a Ctrl-C, or has ended. On a busy machine a program may take seconds to get there, and one that
+/// comes before would end it.
+inline void wait_until_interruptible(pid_t child) {
+  const std::string status = "/proc/" + std::to_string(child) + "/status", field = "SigCgt:";
+  for (int tries = 0; tries < 6000; ++tries) {
+    const std::string text = contents(status);
+    const std::size_t caught = text.find(field);
+    if (caught == std::string::npos || text.find("State:\tZ") != std::string::npos) return;
+    if ((std::stoull(text.substr(caught + field.size()), nullptr, 16) >> (SIGINT - 1) & 1U) != 0) return;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+/// One run of a program, words[0], in a folder of its own; `interrupt_after` that it is ready for one sends it a Ctrl-C.
 inline Outcome run_program(const TemporaryFolder& folder, std::vector<std::string> words,
                            std::chrono::milliseconds interrupt_after = std::chrono::milliseconds::zero()) {
   const std::string out = folder / ".stdout", err = folder / ".stderr";
@@ -46,6 +59,7 @@ inline Outcome run_program(const TemporaryFolder& folder, std::vector<std::strin
   Outcome outcome;
   if (failed != 0) return outcome;
   if (interrupt_after.count() > 0) {
+    wait_until_interruptible(child);
     std::this_thread::sleep_for(interrupt_after);
     ::kill(child, SIGINT);
   }
