@@ -1,6 +1,7 @@
 // Wrong usage is answered with one line and exit code 2, help and version with 0.
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -31,6 +32,39 @@ TEST(CliUsage, HelpAndVersion) {
     EXPECT_NE(fit_help.out.find(option), std::string::npos) << option;
   }
   EXPECT_TRUE(run_swarmfit(folder, {"--version"}).out.starts_with("swarmfit 0."));
+}
+
+/// Help with its line ends and indentation as single spaces.
+std::string in_one_line(const std::string& help) {
+  std::istringstream words(help);
+  std::string line;
+  for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+  return line;
+}
+
+// What help calls the default is what a fit without the option takes.
+TEST(CliUsage, HelpNamesTheThresholdThatIsTaken) {
+  const TemporaryFolder folder;
+  std::string space, pairs;
+  for (int i = 0; i < 60; ++i) {
+    const std::string x = std::to_string((i * 37) % 61), y = std::to_string((i * 53) % 59), z = std::to_string((i * 29) % 47);
+    space += x + "," + y + "," + z + "\n";
+    pairs += x + "," + y + "," + y + "," + z + "\n";
+  }
+  folder.put("space.csv", space);
+  folder.put("pairs.csv", pairs);
+  const std::string help = in_one_line(run_swarmfit(folder, {"fit", "--help"}).out);
+  EXPECT_NE(help.find("[plane, sphere, cylinder: 0.01; homography: 6; fundamental: 2.5; line2d, circle2d, --noise depth: auto]"),
+            std::string::npos);
+  const std::pair<const char*, const char*> taken[] = {
+      {"plane", "0.01"}, {"sphere", "0.01"}, {"cylinder", "0.01"}, {"homography", "6"}, {"fundamental", "2.5"}};
+  for (const auto& [model, threshold] : taken) {
+    const bool of_pairs = model == std::string("homography") || model == std::string("fundamental");
+    const auto outcome = run_swarmfit(folder, {"fit", model, of_pairs ? "pairs.csv" : "space.csv", "--max-models", "1"});
+    ASSERT_EQ(outcome.code, 0) << model << outcome.err;
+    EXPECT_NE(outcome.out.find("threshold " + std::string(threshold) + "\n"), std::string::npos) << model << outcome.out;
+  }
+  EXPECT_NE(in_one_line(run_swarmfit(folder, {"perceive", "--help"}).out).find("[0.01; a stereo pair: 0.015]"), std::string::npos);
 }
 
 TEST(CliUsage, HelpFitsEightyColumns) {
@@ -71,6 +105,8 @@ TEST(CliUsage, ValuesOutOfTheirBounds) {
   for (const char* option : {"--threshold", "--lambda", "--time-budget"}) {
     for (const char* value : {"0", "-1", "nan", "inf", "much"}) expect_refusal(folder, {"fit", "plane", "c.xyz", option, value}, 2, option);
   }
+  for (const char* value : {"1e-31", "1e-300", "1e31", "1e300"})  // no float holds them, or not what many points add up to
+    expect_refusal(folder, {"fit", "plane", "c.xyz", "--threshold", value}, 2, "--threshold: " + std::string(value) + ", must be in ");
   for (const char* option : {"--particles", "--iterations", "--stall", "--min-inliers", "--max-models"}) {
     for (const char* value : {"0", "-1", "nan", "1.5", "99999999999999999999"})
       expect_refusal(folder, {"fit", "plane", "c.xyz", option, value}, 2, option);

@@ -206,7 +206,7 @@ Command add_fit(CLI::App& app) {
       ->group(FitFlags::kGroup)
       ->capture_default_str();
   arguments->vertical.add_to(*sub, FitFlags::kGroup, "with it or --gravity, only planes that are level");
-  arguments->fit.add_to(*sub);
+  arguments->fit.add_to(*sub, "plane, sphere, cylinder: 0.01; homography: 6; fundamental: 2.5; line2d, circle2d, --noise depth: auto");
   arguments->camera.add_to(*sub);
   arguments->output.add_to(*sub, "A folder for result.json and labels.txt");
   sub->footer(

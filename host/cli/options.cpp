@@ -43,6 +43,18 @@ Expected<> positive(const std::string& option, const std::string& text, const st
   return {};
 }
 
+/// Beyond these a float holds no tau, or not what many points of it add up to.
+constexpr double kLeastThreshold = 1e-30, kMostThreshold = 1e30;
+
+/// A --threshold other than auto, into `value`.
+Expected<> threshold_of(const std::string& text, std::optional<double>& value) {
+  const auto number = parse_number(text);
+  if (!number) return invalid(fmt::format("--threshold: {}, must be a number > 0 or auto", text));
+  if (auto ok = positive("--threshold", text, " in the data's unit", value); !ok) return ok;
+  if (*number >= kLeastThreshold && *number <= kMostThreshold) return {};
+  return invalid(fmt::format("--threshold: {}, must be in {}..{} in the data's unit", text, kLeastThreshold, kMostThreshold));
+}
+
 }  // namespace
 
 std::optional<double> parse_number(const std::string& text) {
@@ -67,10 +79,10 @@ Expected<std::vector<double>> parse_list(const std::string& option, const std::s
   return values;
 }
 
-void FitFlags::add_to(CLI::App& app) {
+void FitFlags::add_to(CLI::App& app, const std::string& default_threshold) {
   const char* group = kGroup;
   app.add_option("--threshold", threshold,
-                 "Inliers are within this distance, in the data's unit; auto: from the data's own noise [plane: 0.01, else auto]")
+                 "Inliers are within this distance, in the data's unit; auto: from the data's own noise [" + default_threshold + "]")
       ->type_name("VALUE|auto")
       ->group(group);
   app.add_option("--backend", backend, "auto, cpu, vulkan, reference, or part of a device's name; see swarmfit devices")
@@ -100,10 +112,8 @@ void FitFlags::add_to(CLI::App& app) {
 Expected<> FitFlags::apply(FitOptions& options) const {
   if (threshold == "auto") {
     options.estimate_threshold = true;
-  } else if (!threshold.empty() && !parse_number(threshold)) {
-    return invalid(fmt::format("--threshold: {}, must be a number > 0 or auto", threshold));
-  } else if (auto ok = positive("--threshold", threshold, " in the data's unit", options.threshold); !ok) {
-    return ok;
+  } else if (!threshold.empty()) {
+    if (auto ok = threshold_of(threshold, options.threshold); !ok) return ok;
   }
   if (preset != "fast" && preset != "paper") return invalid(fmt::format("--preset: {}, must be fast or paper", preset));
   options.preset = preset == "fast" ? Preset::fast : Preset::paper;

@@ -20,16 +20,18 @@ namespace swarmfit::cli {
 std::optional<double> parse_number(const std::string& text);
 /// `count` numbers parted by commas. Fails with invalid_option, naming the option and the form it has.
 Expected<std::vector<double>> parse_list(const std::string& option, const std::string& text, const std::string& form, std::size_t count);
-/// An option that is given must be above zero.
-Expected<> must_be_positive(const std::string& option, const std::optional<double>& value, const std::string& unit);
 
-/// How models are found: given to fit, perceive and demo.
+/// How models are found: given to fit, perceive, learn and demo.
 struct FitFlags {
   static constexpr const char* kGroup = "How models are found";
   std::string threshold, preset = "fast", deflation, backend = "auto", particles, iterations, stall, lambda, min_inliers, max_models,
                          time_budget, threads = "0", seed = "1";
 
-  void add_to(CLI::App& app);
+  /// What --threshold is where it is not given, in planes of frames.
+  static constexpr const char* kOfFrames = "0.01; a stereo pair: 0.015";
+
+  /// `default_threshold`: what --threshold is where it is not given, in words.
+  void add_to(CLI::App& app, const std::string& default_threshold = kOfFrames);
   /// Into `options`; what is not given keeps its value. Fails with invalid_option.
   Expected<> apply(FitOptions& options) const;
 };
