@@ -7,7 +7,8 @@
 
 namespace swarmfit::kernels {
 
-/// Columns of a swarm whose positions are a unit normal and an offset, one row for each of their entries and one place in it for each particle.
+/// Columns of a swarm whose positions are a unit normal and an offset: one row for each of their entries, and in it a place for each
+/// particle.
 class HyperplaneFlight {
  public:
   enum Row : std::size_t { position, velocity, own, best, pull_own, pull_best, kRows };
@@ -21,9 +22,9 @@ class HyperplaneFlight {
   /// Of one entry, 0 <= entry <= axes; the last is the offset.
   double* row(Row which, std::size_t entry) noexcept { return values_.data() + (which * (axes_ + 1) + entry) * places_; }
 
-  /// For each particle v <- inertia v + pull_own (own - x) + pull_best (best - x), entry by entry, and x <- x + v: differences of normals are
-  /// ways on the sphere, n and -n being one, a quarter turn at most is flown, and the velocity is carried along (sphere_maps.hpp has the same
-  /// for one at a time). A particle that would get anywhere not finite stays where it is and stands still.
+  /// Eq. (1) of Zhou et al. 2010. For each particle v <- inertia v + pull_own (own - x) + pull_best (best - x), entry by entry, and
+  /// x <- x + v: differences of normals are ways on the sphere, n and -n being one, a quarter turn at most is flown, and the velocity is
+  /// carried along. A particle that would get anywhere not finite stays where it is and stands still.
   void step(double inertia);
 
  private:

@@ -32,7 +32,6 @@ std::pair<float, float> bulk(const float* column, std::size_t count) {
   return {low - margin, high + margin};
 }
 
-
 /// The list in chunks of rows, fixed by its length alone.
 struct Chunks {
   std::size_t points, rows, count;

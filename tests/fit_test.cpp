@@ -396,6 +396,8 @@ TEST(FitOptions, EachBoundIsChecked) {
   EXPECT_EQ(message([](FitOptions&) {}), "");
   EXPECT_EQ(message([](FitOptions& o) { o.threshold = -0.5; }), "threshold is -0.5, must be finite and > 0");
   EXPECT_EQ(message([](FitOptions& o) { o.threshold = NAN; }), "threshold is nan, must be finite and > 0");
+  EXPECT_EQ(message([](FitOptions& o) { o.threshold = 1e-300; }), "threshold is 1e-300, must be in [1e-30, 1e30]");
+  EXPECT_EQ(message([](FitOptions& o) { o.threshold = 1e31; }), "threshold is 1e+31, must be in [1e-30, 1e30]");
   EXPECT_EQ(message([](FitOptions& o) { o.particles = 1; }), "particles is 1, must be in [2, 1000000]");
   EXPECT_EQ(message([](FitOptions& o) { o.iterations = 0; }), "iterations is 0, must be >= 1");
   EXPECT_EQ(message([](FitOptions& o) { o.stall = 0; }), "stall is 0, must be >= 1");

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
 #include "host/models/sphere_maps.hpp"
 #include "kernels/cpu/flight_kernels.hpp"
@@ -50,7 +50,11 @@ class Particles {
   explicit Particles(std::size_t count) : random_(static_cast<unsigned>(count) + D) {
     for (std::size_t j = 0; j < count; ++j) {
       at.push_back(flat());
-      own.push_back(j % 5 == 0 ? at[j] : j % 5 == 1 ? Flat<D>(-at[j]) : j % 5 == 2 ? near(at[j], 1e-9) : j % 5 == 3 ? across(at[j]) : flat());
+      own.push_back(j % 5 == 0   ? at[j]
+                    : j % 5 == 1 ? Flat<D>(-at[j])
+                    : j % 5 == 2 ? near(at[j], 1e-9)
+                    : j % 5 == 3 ? across(at[j])
+                                 : flat());
       best.push_back(j % 3 == 0 ? near(at[j], 0.01) : flat());
       velocity.push_back(Flat<D>::Zero());
       if (j % 4 != 0) velocity[j] = Flat<D>::NullaryExpr([&] { return (j % 4 == 1 ? 3 : 0.01) * normal_(random_); });

@@ -91,7 +91,7 @@ void FitFlags::add_to(CLI::App& app, const std::string& default_threshold) {
       ->capture_default_str();
   app.add_option("--threads", threads, "Threads of the CPU back end; 0: all")->type_name("N")->group(group)->capture_default_str();
   app.add_option("--seed", seed, "The same seed gives the same result")->type_name("N")->group(group)->capture_default_str();
-  app.add_option("--preset", preset, "fast: what measures best; paper: Zhou et al. 2010 to the letter")
+  app.add_option("--preset", preset, "fast: what measures best; paper: Zhou et al. 2010")
       ->type_name("fast|paper")
       ->group(group)
       ->capture_default_str();

@@ -21,9 +21,9 @@ struct NoiseScale {
   std::vector<Known> models;  ///< the prominent models that told it, refined under it; nobody need search for them again
 };
 
-/// tau = 2.5 sigma of a point whose `spread` is 1 (noise_model.hpp; empty: of all), sigma the noise of the most prominent models: a swarm finds one under a generous threshold, the spread of its
-/// inliers gives the next threshold, until that stays. `points` stand for a whole cloud of `finite_points`; `part` of them as MultiModel
-/// takes it; `watch` may look on. Fails with bad_input where the data show no scale.
+/// tau = 2.5 sigma of a point whose `spread` is 1 (noise_model.hpp; empty: of all), sigma the noise of the most prominent models: a swarm
+/// finds one under a generous threshold, the spread of its inliers gives the next threshold, until that stays. `points` stand for a whole
+/// cloud of `finite_points`; `part` of them as MultiModel takes it; `watch` may look on. Fails with bad_input where the data show no scale.
 Expected<NoiseScale> estimate_threshold(kernels::FitnessEvaluator& evaluator, const models::WorkingPoints& points, const Part& part,
                                         std::size_t finite_points, const FitOptions& options, Watch* watch = nullptr,
                                         std::span<const float> spread = {});

@@ -93,6 +93,8 @@ std::vector<ModelType> FitOptions::kinds() const {
 Expected<> FitOptions::validate() const {
   Expected<> checks[] = {
       require(!threshold || positive(*threshold), "threshold", threshold.value_or(0), "finite and > 0"),
+      // A float holds it, and what many points of it add up to.
+      require(!threshold || (*threshold >= 1e-30 && *threshold <= 1e30), "threshold", threshold.value_or(0), "in [1e-30, 1e30]"),
       require(!particles || (*particles >= 2 && *particles <= 1'000'000), "particles", particles.value_or(0), "in [2, 1000000]"),
       require(!iterations || *iterations >= 1, "iterations", iterations.value_or(0), ">= 1"),
       require(!stall || *stall >= 1, "stall", stall.value_or(0), ">= 1"),

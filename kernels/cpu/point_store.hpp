@@ -92,7 +92,7 @@ class PointStore {
   Columns all_, costly_;
   bool apart_ = false;  ///< whether the costly points are in `costly_`
   float most_cap_ = 0;
-  std::vector<std::uint32_t> input_;  ///< empty where it would be the identity
+  std::vector<std::uint32_t> input_;   ///< empty where it would be the identity
   std::vector<std::uint32_t> places_;  ///< of those of costly_, in all_
   MortonOrder morton_;
   Aligned<float> unsorted_;  ///< what sorting leaves is kept for the next cloud, unless that is large

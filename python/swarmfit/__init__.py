@@ -99,7 +99,7 @@ _FIT_OPTIONS = """
         backend: "auto", "cpu", "vulkan", "reference", or part of a device's name; see devices().
         threads: of the CPU back end; 0 takes all.
         seed: the same seed gives the same answer, on any number of threads.
-        preset: "fast", what measures best; "paper", Zhou et al. 2010 to the letter. Decides what is left to the default below.
+        preset: "fast", what measures best; "paper", Zhou et al. 2010. Decides what is left to the default below.
         particles, iterations, stall: size of the swarm; most steps of one; converged after so many steps without a better one.
         deflation: "residual" or "parametric". lambda_: strength of the latter.
         loss: "truncated_l1" or "truncated_l2".

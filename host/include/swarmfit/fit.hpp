@@ -23,7 +23,7 @@ namespace swarmfit {
 
 enum class Preset {
   fast,   ///< what measures best
-  paper,  ///< Zhou et al. 2010 to the letter
+  paper,  ///< Zhou et al. 2010, and what docs/method.md says where that leaves a choice
 };
 enum class Deflation {
   residual,    ///< each point's cap sinks with what has been explained of it
@@ -48,7 +48,7 @@ struct FitOptions {
   ModelType model = ModelType::plane;
   std::vector<ModelType> rivals;  ///< further kinds that compete with `model` for the same points; all of 2 or all of 3 columns, each once
   std::optional<OwnModel> own;    ///< with `model` = own, and only then: what is fitted; no rivals, and residual deflation
-  std::optional<double> threshold;  ///< tau [data unit], > 0; none: the kind's default (plane, sphere, cylinder 0.01;
+  std::optional<double> threshold;  ///< tau [data unit], in [1e-30, 1e30]; none: the kind's default (plane, sphere, cylinder 0.01;
                                     ///< homography 6 px, fundamental 2.5 px; line2d, circle2d, own, and any with noise, estimate it)
   bool estimate_threshold = false;  ///< tau from the data's own noise, whatever `threshold` says
   Noise noise = Noise::none;        ///< depth: of 3 columns only; tau is for the near end, beyond three tenths of the points
