@@ -51,11 +51,11 @@ Neighbours::Neighbours(const WorkingPoints& points, std::span<const std::uint32_
   }
 }
 
-void estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates, const Neighbours& neighbours,
-                      std::vector<Eigen::Vector3f>& normals) {
+std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates,
+                                              const Neighbours& neighbours) {
   constexpr double kFlat = 0.5;  // of the next larger spread: above, the neighbourhood is no surface
-  normals.assign(points.size(), Eigen::Vector3f::Zero());
-  if (neighbours.empty()) return;
+  std::vector<Eigen::Vector3f> normals(candidates.size(), Eigen::Vector3f::Zero());
+  if (neighbours.empty()) return normals;
   for (std::size_t c = 0; c < candidates.size(); ++c) {
     Eigen::Vector3d mean = points.point<3>(candidates[c]);
     Eigen::Matrix3d square = mean * mean.transpose();
@@ -71,8 +71,9 @@ void estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t
     solver.computeDirect(scatter);
     const Eigen::Vector3d spread = solver.eigenvalues();
     if (!(spread[0] < kFlat * spread[1])) continue;
-    normals[candidates[c]] = solver.eigenvectors().col(0).cast<float>();
+    normals[c] = solver.eigenvectors().col(0).cast<float>();
   }
+  return normals;
 }
 
 }  // namespace swarmfit::models

@@ -27,9 +27,8 @@ class Neighbours {
   std::vector<std::uint32_t> nearest_;
 };
 
-/// Unit normals of points in space: of the plane through each candidate and its neighbours. `normals` has an entry for every point of the
-/// cloud; candidates whose neighbourhood has no one plane, and all others, keep zero.
-void estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates, const Neighbours& neighbours,
-                      std::vector<Eigen::Vector3f>& normals);
+/// Unit normals of points in space, one a candidate: of the plane through it and its neighbours; zero where those have no one plane.
+std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates,
+                                              const Neighbours& neighbours);
 
 }  // namespace swarmfit::models

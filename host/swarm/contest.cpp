@@ -18,6 +18,10 @@ constexpr double kWellGathered = 0.8;              // the same: above, it is not
 constexpr double kHeld = 0.4;                      // share of its points that must lie along it, times that of neighbours alike,
 constexpr double kHeldPerBeside = 2;               // and so much more for each point beside it, of its own
 constexpr std::size_t kBesides = 8;                // nearest neighbours of a point that are asked whose they are
+constexpr double kThin = 6;                        // tau: a cylinder that is wider lies about no box on all sides
+constexpr std::size_t kNext = 4;                   // nearest neighbours of a point along it that are asked how far off they are
+constexpr double kEven = 0.8;                      // von Neumann's ratio: below, they are off to the same side
+constexpr double kAsGood = 0.95;                   // times what the faces of a box save: such a cylinder must save more
 constexpr double kClearly = 1.1;                   // times what a flat model is worth: a curved one must be worth more
 
 /// The caps of those points that a model explains; 0 elsewhere.
@@ -102,10 +106,46 @@ bool MultiModel::is_strewn(const Candidate& candidate) const {
   return held(candidate) < kHeld + kHeldPerBeside * beside;
 }
 
+bool MultiModel::is_cornered(const Candidate& candidate) const {
+  if (space(candidate.kind).type() != ModelType::cylinder) return false;
+  // A wider box is not within tau of a cylinder about it.
+  const double radius = candidate.theta[candidate.theta.size() - 1], unit = points_.frame().scale;
+  if (radius * unit > kThin * static_cast<double>(tau_)) return false;
+  const std::span<const std::uint32_t> index = part_.index();
+  const auto own = [&](std::uint32_t i) { return candidate.distances[i] < caps_[i]; };
+  const auto off = [&](const Eigen::Vector3d& at) { return space(candidate.kind).outward(candidate.theta, at).norm() - radius; };
+  double apart = 0, square = 0;
+  std::vector<std::pair<double, double>> near;
+  for (std::size_t place = 0; place < index.size(); ++place) {
+    if (!own(index[place])) continue;
+    const Eigen::Vector3d at = points_.point<3>(index[place]);
+    const double here = off(at);
+    // What is nearest in space is nearest in how far it is off as well; along the surface, noise knows nothing of its neighbours.
+    near.clear();
+    for (const std::uint32_t other : neighbours_.of(place)) {
+      if (!own(index[other])) continue;
+      const Eigen::Vector3d there = points_.point<3>(index[other]);
+      const double its = off(there);
+      near.emplace_back((there - at).squaredNorm() - (its - here) * (its - here), its);
+    }
+    const auto last = near.begin() + static_cast<std::ptrdiff_t>(std::min(kNext, near.size()));
+    std::partial_sort(near.begin(), last, near.end());
+    for (auto other = near.begin(); other != last; ++other) {
+      apart += (here - other->second) * (here - other->second);
+      square += here * here + other->second * other->second;
+    }
+  }
+  return apart < kEven * square;
+}
+
 double MultiModel::saving(std::size_t kind, const models::Position& theta, std::span<const float> caps,
                           std::span<const float> distances) const {
+  return bare_saving(caps, distances) * agreement(kind, theta, caps, distances);
+}
+
+double MultiModel::bare_saving(std::span<const float> caps, std::span<const float> distances) const {
   std::vector<float> caps_room, room;
-  return saved(levelled(caps, caps_room), levelled(distances, room)) * agreement(kind, theta, caps, distances);
+  return saved(levelled(caps, caps_room), levelled(distances, room));
 }
 
 std::size_t MultiModel::flat_kind(std::size_t curved) const noexcept {
@@ -213,8 +253,11 @@ Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat
   const double own = worth(saving(winner.kind, winner.theta, caps, winner.distances), space(winner.kind).freedom());
   const double share = gathered(winner);
   const bool strewn = share < kGathered || is_strewn(winner);
-  const int most = share < kWellGathered ? kFaces : kFlats;
-  double together = 0;
+  // Normals near the edges of a thin box are those of a cylinder: there the distances alone decide.
+  const bool cornered = !strewn && is_cornered(winner);
+  const double bare = bare_saving(caps, winner.distances);
+  const int asked = share < kWellGathered ? kFaces : kFlats, most = cornered ? kFaces : asked;
+  double together = 0, bare_together = 0;
   for (int flats = 1; flats <= most; ++flats) {
     models::Position theta;
     auto there = best_on(kind, caps, theta, distances);
@@ -224,7 +267,9 @@ Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat
     if (strewn) return false;
     together += saving(kind, theta, caps, distances);
     const double theirs = worth(together, flats * space(kind).freedom());
-    if (own <= kClearly * theirs) return false;
+    if (flats <= asked && own <= kClearly * theirs) return false;
+    bare_together += bare_saving(caps, distances);
+    if (cornered && bare <= kAsGood * bare_together) return false;
     take_nearer(distances, caps);
   }
   return true;

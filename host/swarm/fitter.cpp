@@ -10,6 +10,7 @@
 #include "host/common/thrown.hpp"
 #include "host/models/model_space.hpp"
 #include "host/models/own_model.hpp"
+#include "host/swarm/along.hpp"
 #include "host/swarm/fitter_parts.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/multi_model.hpp"
@@ -248,6 +249,9 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     found = moved(std::move(found), working.frame(), whole->frame());
     hidden = moved(std::move(hidden), working.frame(), whole->frame());
     if (auto done = swarm::refit(ground, found, search->shares_points(), hidden); !done) return tl::unexpected(done.error());
+  }
+  if (settings.refine && options.preset == Preset::fast) {
+    if (auto done = swarm::refine_along(ground, found, hidden); !done) return tl::unexpected(done.error());
   }
   result.labels = thin_rows ? std::vector<std::uint16_t>{} : search->labels();
   std::vector<float> corners;

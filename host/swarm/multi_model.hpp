@@ -198,7 +198,11 @@ class MultiModel {
   double held(const Candidate& candidate) const;
   /// Is a curved model made of what lies here and there?
   bool is_strewn(const Candidate& candidate) const;
-  /// Sum over points of what a model saves, as far as they lie along it [data unit].
+  /// Are neighbours off a cylinder to the same side, as those of a box about its edges and its faces are?
+  bool is_cornered(const Candidate& candidate) const;
+  /// Sum over points of what a model saves [data unit].
+  double bare_saving(std::span<const float> caps, std::span<const float> distances) const;
+  /// The same, as far as they lie along it.
   double saving(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
   /// The same of the part's points, in thresholds.
   double saving_along(std::size_t kind, const models::Position& theta, std::span<const float> distances) const;

@@ -190,8 +190,9 @@ Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space
   const bool correspondences = points.dimension() > 3;
   if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
   if (space.agrees_by_normals()) {
-    std::vector<Eigen::Vector3f> normals;
-    models::estimate_normals(points, part.points.index(), part.neighbours, normals);
+    const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, part.points.index(), part.neighbours);
+    std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
+    for (std::size_t k = 0; k < known.size(); ++k) normals[part.points.index()[k]] = known[k];
     points.set_normals(std::move(normals));
   }
   return part;
