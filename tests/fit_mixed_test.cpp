@@ -34,6 +34,17 @@ class Scene {
       add(foot + Vector(r * std::cos(turn), r * std::sin(turn), uniform(0, height)), label);
     }
   }
+  /// As seen from afar along x, with so many points that trail off behind its edges.
+  void half_cylinder(const Vector& foot, double radius, double height, std::size_t count, std::size_t trailing, std::uint16_t label) {
+    const auto at = [&](double turn, double r) -> Vector {
+      return foot + Vector(r * std::cos(turn), r * std::sin(turn), uniform(0, height));
+    };
+    for (std::size_t i = 0; i < count; ++i) add(at(uniform(-1.3, 1.3), radius + noise()), label);
+    for (std::size_t i = 0; i < trailing; ++i) {
+      const double turn = i % 2 == 0 ? uniform(1.25, 1.35) : uniform(-1.35, -1.25);
+      add(at(turn, radius + uniform(0, 0.01)) - Vector(uniform(0, 0.02), 0, 0), 0);
+    }
+  }
   void sphere(const Vector& centre, double radius, std::size_t count, std::uint16_t label) {
     for (std::size_t i = 0; i < count; ++i) {
       const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), flat = std::sqrt(1 - z * z);
@@ -284,6 +295,18 @@ TEST_P(FitMixed, ABallThatAPlaneCutsIsStillPaidFor) {
   expect_radii(*result, ModelType::sphere, std::array{0.05});
 }
 
+TEST_P(FitMixed, AnOutlineDoesNotWidenWhatItSurrounds) {
+  // Where a camera mixes a cylinder with what is behind it, points trail off from its edges, within tau of it and outside.
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  Scene scene(seed + 1000);
+  scene.table(9000);
+  scene.half_cylinder(Vector(0, 0, 0.01), 0.04, 0.2, 2000, 800, 2);
+  const auto result = fit(scene.points(), options_for({ModelType::cylinder}, seed));
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_EQ(result->models.size(), 1U) << told(*result);
+  EXPECT_NEAR(radius(result->models[0]), 0.04, 0.06 * 0.04) << told(*result);
+}
+
 INSTANTIATE_TEST_SUITE_P(Seeds, FitMixed, testing::Range(1, 6));
 
 TEST(FitMixedOnce, SameAnswerOnOneThreadAndTwo) {
@@ -302,6 +325,40 @@ TEST(FitMixedOnce, SameAnswerOnOneThreadAndTwo) {
     EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
     EXPECT_EQ(one->models[m].evaluations, two->models[m].evaluations);
   }
+}
+
+TEST(FitMixedOnce, FewThinBoxesAreTakenForCylinders) {
+  // Each lies within tau of one, on all sides: by its points' distances alone the cylinder is a good one.
+  constexpr double kSide = 0.055;
+  std::size_t taken = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Scene scene(seed + 1100);
+    scene.table(6000);
+    for (const double x : {-0.3, 0.2}) scene.box({x, scene.uniform(-0.2, 0.2), 0}, {kSide, kSide, 0.2}, 15000);
+    const auto result = fit(scene.points(), options_for({ModelType::cylinder}, seed));
+    ASSERT_TRUE(result) << result.error().message;
+    taken += result->models.size();
+  }
+  EXPECT_LE(taken, 3U) << "of 10";
+}
+
+TEST(FitMixedOnce, WhatIsRefusedHidesLittle) {
+  // Much is refused that runs across boxes and what stands beside them. Each of these cylinders has a little over one point in a hundred.
+  std::size_t found = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Scene scene(seed + 1200);
+    scene.table(9000);
+    for (int k = 0; k < 6; ++k) {
+      const double x = -0.45 + 0.18 * k, y = k % 2 == 0 ? -0.2 : 0.2;
+      scene.box({x, y, 0}, {0.12, 0.12, 0.15}, 9000);
+      scene.cylinder({x, 0.5 * y, 0.01}, 0.03, 0.12, 260, static_cast<std::uint16_t>(2 + k));
+    }
+    scene.outliers(3000);
+    const auto result = fit(scene.points(), options_for({ModelType::cylinder}, seed));
+    ASSERT_TRUE(result) << result.error().message;
+    for (const Model& model : result->models) found += std::abs(radius(model) - 0.03) < 0.05 * 0.03 ? 1U : 0U;
+  }
+  EXPECT_GE(found, 13U) << "of 30";
 }
 
 TEST(FitMixedOnce, LinesAndCircles) {

@@ -90,9 +90,10 @@ Expected<> MultiModel::deflate(const Candidate& candidate) {
 }
 
 Expected<> MultiModel::set_aside(const Candidate& candidate) {
-  const DeadZone no_tail{tau_, allowed_, 1, {}, settings_.dead_zone_slope};
-  Near nowhere;
-  swarm::deflate(candidate.distances, no_tail, 0, caps_, nowhere);
+  // It may lie across something small that is round, and only a box is known to be nothing else.
+  constexpr float kHalf = 0.5F;
+  const float kept = is_cornered(candidate) ? 0 : kHalf;
+  for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] *= candidate.distances[i] < caps_[i] ? kept : 1.0F;
   return show(caps_);
 }
 
