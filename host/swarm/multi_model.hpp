@@ -116,7 +116,7 @@ class MultiModel {
   Expected<> take_found(Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<bool> accept(const Candidate& candidate, const ModelCallback& on_model, FitResult& result);
   Expected<> deflate(const Candidate& candidate);
-  /// The points of a candidate that was rejected are left as they are from now on; it is no neighbour of theirs.
+  /// The points of a candidate that was rejected are worth less from now on; it is no neighbour of theirs.
   Expected<> set_aside(const Candidate& candidate);
   Expected<> finish(FitResult& result);
   /// Each model refined on what the others leave it, as far as that does not raise the energy of all.
