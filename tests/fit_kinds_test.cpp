@@ -245,6 +245,93 @@ TEST(FitFundamental, WrongCorrespondencesAreNoMotion) {
   }
 }
 
+/// So many correspondences, the second about `sigma` from the first [px].
+std::vector<double> strewn(unsigned seed, int count, double sigma) {
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> normal(0, sigma);
+  std::vector<double> rows;
+  for (int i = 0; i < count; ++i) {
+    const double x = 640 * unit(engine), y = 480 * unit(engine), by_x = normal(engine), by_y = normal(engine);
+    rows.insert(rows.end(), {x, y, x + by_x, y + by_y});
+  }
+  return rows;
+}
+
+TEST(FitFundamental, WrongCorrespondencesNotFarFromEachOtherAreNoMotion) {
+  // Seven degrees of freedom find some that happen to agree to a pixel, and then others for the rest.
+  struct Scene {
+    unsigned seed;
+    int count;
+    double sigma;
+  };
+  for (const auto& [seed, count, sigma] : {Scene{1, 60, 15},
+                                           {2, 60, 15},
+                                           {23, 60, 15},
+                                           {43, 100, 30},
+                                           {45, 100, 30},
+                                           {46, 100, 30},
+                                           {53, 60, 15},
+                                           {56, 60, 30},
+                                           {3, 400, 57},
+                                           {4, 400, 57}}) {
+    const auto result = fit_fundamental(strewn(seed, count, sigma), 1);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_TRUE(result->models.empty()) << result->models.size() << " of " << count << " in scene " << seed;
+  }
+}
+
+TEST(FitFundamental, TwoSearchesEndAlikeSideBySideAndOneAfterTheOther) {
+  for (std::uint64_t scene = 1; scene <= 4; ++scene) {
+    const Motions made = few_points(scene, {45, 35, 25});
+    FitOptions options;
+    options.model = ModelType::fundamental;
+    options.backend = "cpu";
+    std::vector<FitResult> results;
+    for (const int threads : {1, 2, 3, 0}) {
+      options.threads = threads;
+      auto fitter = Fitter::create(options);
+      ASSERT_TRUE(fitter);
+      // Under an observer's eyes one goes after the other, and it is told of both.
+      std::size_t told = 0;
+      if (threads == 0) fitter->observe([&](const SwarmStep& step) { told += step.fitness.size(); });
+      auto result = fitter->fit(PointsView(std::span<const double>(made.rows), 4));
+      ASSERT_TRUE(result) << result.error().message;
+      if (threads == 0) {
+        EXPECT_EQ(told, result->evaluations);
+      }
+      results.push_back(std::move(*result));
+    }
+    for (const FitResult& other : results) {
+      EXPECT_EQ(other.labels, results.front().labels);
+      EXPECT_EQ(other.evaluations, results.front().evaluations);
+      ASSERT_EQ(other.models.size(), results.front().models.size());
+      for (std::size_t m = 0; m < other.models.size(); ++m) EXPECT_EQ(other.models[m].parameters, results.front().models[m].parameters);
+    }
+  }
+}
+
+TEST(FitFundamental, WhoHasEnoughGetsNoneOfASecondSearch) {
+  const Motions made = few_points(2, {60, 60, 60});
+  FitOptions options;
+  options.model = ModelType::fundamental;
+  options.backend = "cpu";
+  for (const int threads : {1, 2}) {
+    options.threads = threads;
+    std::size_t told = 0;
+    const auto on_model = [&](const Model&) { return ++told == 1 ? Verdict::stop : Verdict::go_on; };
+    const auto result = fit(PointsView(std::span<const double>(made.rows), 4), options, on_model);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_EQ(told, 1U);
+    EXPECT_EQ(result->stop_reason, "stopped by the caller");
+    options.max_models = 1;
+    const auto one = fit(PointsView(std::span<const double>(made.rows), 4), options);
+    ASSERT_TRUE(one) << one.error().message;
+    EXPECT_EQ(one->models.size(), 1U);
+    options.max_models = 0;
+  }
+}
+
 /// Of five circles of 50 points each among as many outliers as points, how many have a model within half a threshold's breadth of theirs.
 int circles_found(unsigned scene) {
   constexpr double kSigma = 0.0075;

@@ -51,12 +51,7 @@ class Moves : public testing::Test {
     for (const std::size_t m : owners) labelling_->mark_owned(m, marks);
     Sampler sampler(points_, part_->points.index(), part_->neighbours, *space_, random_);
     EXPECT_TRUE(sampler.keep_to(marks));
-    std::vector<models::Position> samples;
-    for (std::uint32_t k = 0; k < 50; ++k) {
-      models::Position theta;
-      if (sampler.draw(k % 2 == 0, 1, 0, k, theta)) samples.push_back(theta);
-    }
-    return samples;
+    return sampler.draw_some(50, 2, 1);
   }
   std::vector<std::uint16_t> labels() const {
     std::vector<std::uint16_t> all(points_.size());
@@ -101,6 +96,39 @@ TEST_F(Moves, NoMoreModelsComeOfItThanWereAskedFor) {
   ASSERT_TRUE(joined);
   EXPECT_FALSE(*joined);
   EXPECT_EQ(labelling_->models().size(), 1U);
+}
+
+TEST_F(Moves, OtherModelsTakeThePlaceWhereTheyEndLower) {
+  show({{0, 3, 0, kEach}, {130, -3, 0, kEach}});
+  ASSERT_TRUE(labelling_->start({{shifted(0, 0)}}));
+  const double before = labelling_->energy();
+  ASSERT_TRUE(labelling_->contend({{shifted(3, 0), shifted(-3, 0)}}));
+  EXPECT_LT(labelling_->energy(), before - 5);
+  EXPECT_EQ(labelling_->kept(), (std::vector<std::size_t>{Labelling::kJoined, Labelling::kJoined}));
+  // Worse ones do not, and nothing changes.
+  const double after = labelling_->energy();
+  ASSERT_TRUE(labelling_->contend({{shifted(40, 0)}}));
+  EXPECT_EQ(labelling_->energy(), after);
+  EXPECT_EQ(labelling_->models().size(), 2U);
+}
+
+TEST_F(Moves, ModelsOfTheBeatenSideJoin) {
+  // Each side has found one of two surfaces; the larger wins and the other's model comes along.
+  show({{0, 8, 0, kEach}, {130, -8, 0, kEach / 2}});
+  ASSERT_TRUE(labelling_->start({{shifted(-8, 0)}}));
+  ASSERT_TRUE(labelling_->contend({{shifted(8, 0)}}));
+  ASSERT_EQ(labelling_->models().size(), 2U);
+  for (const std::uint16_t label : labels()) EXPECT_NE(label, 0);
+}
+
+TEST_F(Moves, NeighboursAgreeWhereModelsAreOfOneThingEach) {
+  show({{0, 8, 0, kEach}, {130, -8, 0, kEach}});
+  ASSERT_TRUE(labelling_->start({{shifted(8, 0), shifted(-8, 0)}}));
+  EXPECT_GT(labelling_->coherence(), 0.9);
+  // Two that lie over each other: whose a point is says nothing of its neighbours.
+  show({{0, 8, 0, kEach}, {0, -8, 0, kEach}});
+  ASSERT_TRUE(labelling_->start({{shifted(8, 0)}}));
+  EXPECT_LT(labelling_->coherence(), 0.57);
 }
 
 TEST_F(Moves, OneSurfaceDoesNotComeApart) {

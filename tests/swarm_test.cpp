@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -187,6 +188,52 @@ TEST_P(KnownLandscape, SwarmConvergesOnTheOptimum) {
   }
   const models::Position found = space->to_data(swarm.best(), points.frame());
   EXPECT_LT(space->distance(found, hidden), 0.01);
+}
+
+TEST(Payment, AFittedModelsEmptyRingSaysNothingAmongMany) {
+  // As the joint end makes them of 400 strewn correspondences: 30 close by, nobody just beyond, some everywhere else.
+  Settings settings;
+  settings.min_inliers = 15;
+  Support strewn;
+  strewn.unexplained = 400;
+  strewn.slabs = {30, 5, 4, 2, 2, 2, 5};
+  strewn.inner = 30;
+  EXPECT_TRUE(pays(strewn, settings, 7));
+  EXPECT_FALSE(pays_among_others(strewn, settings, 7));
+  // A body of 80 pays either way, and one of too few points neither.
+  Support body = strewn;
+  body.slabs[0] = body.inner = 80;
+  EXPECT_TRUE(pays(body, settings, 7));
+  EXPECT_TRUE(pays_among_others(body, settings, 7));
+  settings.min_inliers = 100;
+  EXPECT_FALSE(pays_among_others(body, settings, 7));
+}
+
+TEST(Samples, WhatOneGetsHasNothingToDoWithWhoElseAsks) {
+  // Correspondences at random: most samples are thrown away, so that several attempts are under way at once.
+  std::mt19937 engine(4);
+  std::uniform_real_distribution<double> unit(0, 500);
+  std::vector<double> rows(4 * 60);
+  for (double& value : rows) value = unit(engine);
+  models::WorkingPoints points(PointsView(std::span<const double>(rows), 4));
+  const auto space = models::make_space(ModelType::fundamental, {});
+  const Random random(5);
+  const Part part = look_closely(points, *space, random, kSampledFrom);
+  const Sampler sampler(points, part.points.index(), part.neighbours, *space, random);
+  std::vector<Sampler::Ask> asks;
+  for (std::uint32_t k = 0; k < 40; ++k) asks.push_back({k, k % 2 == 0});
+  std::vector<models::Position> together(asks.size());
+  std::vector<std::uint8_t> drawn(asks.size());
+  sampler.draw(asks, 1, 2, together, drawn);
+  EXPECT_GT(std::count(drawn.begin(), drawn.end(), 1), 30);
+  for (std::size_t k = 0; k < asks.size(); ++k) {
+    models::Position alone;
+    std::uint8_t found = 0;
+    sampler.draw({&asks[k], 1}, 1, 2, {&alone, 1}, {&found, 1});
+    ASSERT_EQ(found, drawn[k]) << k;
+    if (found == 0) continue;
+    EXPECT_EQ(alone, together[k]) << k;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Both, KnownLandscape, testing::Values(Topology::roulette, Topology::ring));

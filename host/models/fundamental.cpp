@@ -1,41 +1,13 @@
-#include <array>
+#include <algorithm>
+#include <bit>
 
 #include "host/models/projective.hpp"
+#include "kernels/seven_point.hpp"
 
 namespace swarmfit::models {
 namespace {
 
 using Svd = Eigen::JacobiSVD<Eigen::Matrix3d>;
-
-/// Real roots of c[0] + c[1] x + c[2] x^2 + c[3] x^3.
-int real_roots(const std::array<double, 4>& c, std::array<double, 3>& roots) {
-  const double size = std::max({std::abs(c[0]), std::abs(c[1]), std::abs(c[2]), std::abs(c[3])});
-  if (!(size > 0) || !std::isfinite(size)) return 0;
-  if (std::abs(c[3]) < 1e-12 * size) {
-    if (std::abs(c[2]) < 1e-12 * size) {
-      if (std::abs(c[1]) < 1e-12 * size) return 0;
-      roots[0] = -c[0] / c[1];
-      return 1;
-    }
-    const double inside = c[1] * c[1] - 4 * c[2] * c[0];
-    if (inside < 0) return 0;
-    roots[0] = (-c[1] + std::sqrt(inside)) / (2 * c[2]);
-    roots[1] = (-c[1] - std::sqrt(inside)) / (2 * c[2]);
-    return 2;
-  }
-  const double a = c[2] / c[3], b = c[1] / c[3], d = c[0] / c[3];
-  const double q = (a * a - 3 * b) / 9, r = (2 * a * a * a - 9 * a * b + 27 * d) / 54;
-  if (r * r < q * q * q) {
-    const double angle = std::acos(std::clamp(r / std::sqrt(q * q * q), -1.0, 1.0));
-    for (int k = 0; k < 3; ++k) {
-      roots[static_cast<std::size_t>(k)] = -2 * std::sqrt(q) * std::cos((angle + 2 * k * 3.14159265358979323846) / 3) - a / 3;
-    }
-    return 3;
-  }
-  const double u = -std::copysign(std::cbrt(std::abs(r) + std::sqrt(std::max(0.0, r * r - q * q * q))), r);
-  roots[0] = u + (u != 0 ? q / u : 0) - a / 3;
-  return 1;
-}
 
 class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
  public:
@@ -44,33 +16,20 @@ class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
   int minimal_sample() const noexcept override { return 7; }
   int freedom() const noexcept override { return 7; }
 
-  /// Seven correspondences leave a pencil of matrices, of which up to three have rank 2. Those that put points behind a camera are left
-  /// out; where several remain, the sample itself, taken as a number, decides.
   bool from_sample(const WorkingPoints& points, std::span<const std::uint32_t> sample, Position& theta) const override {
-    Eigen::Matrix<double, 3, 7> a, b;
-    for (int i = 0; i < 7; ++i) {
-      const Eigen::Vector4d p = points.point<4>(sample[static_cast<std::size_t>(i)]);
-      a.col(i) = first(p);
-      b.col(i) = second(p);
-    }
-    Eigen::Matrix3d ta, tb;
-    if (!normalise(a, ta) || !normalise(b, tb)) return false;
-    Eigen::Matrix3d f[2];
-    if (!pencil(a, b, f)) return false;
-    std::array<double, 3> roots{};
-    const int count = real_roots(determinant(f[0], f[1]), roots);
-    std::array<Eigen::Matrix3d, 3> candidates;
-    std::size_t kept = 0;
-    for (int k = 0; k < count; ++k) {
-      const Eigen::Matrix3d one = f[0] + roots[static_cast<std::size_t>(k)] * f[1];
-      if (oriented(one, a, b)) candidates[kept++] = one;
-    }
-    if (kept == 0) return false;
-    std::size_t number = 0;
-    for (const std::uint32_t i : sample) number = number * 31 + i;
-    theta = position(tb.transpose() * candidates[number % kept] * ta);
-    return admit(theta);
+    std::uint8_t found = 0;
+    from_samples(points, sample, {&theta, 1}, {&found, 1});
+    return found != 0;
   }
+
+  void from_samples(const WorkingPoints& points, std::span<const std::uint32_t> samples, std::span<Position> thetas,
+                    std::span<std::uint8_t> found) const override {
+    for (std::size_t first = 0; first < found.size(); first += kernels::kSevenPointLanes) {
+      const std::size_t count = std::min(kernels::kSevenPointLanes, found.size() - first);
+      solve(points, samples.subspan(first * kPoints, count * kPoints), thetas.subspan(first, count), found.subspan(first, count));
+    }
+  }
+  std::size_t samples_at_once() const noexcept override { return kernels::kSevenPointLanes; }
 
   Position to_data(const Position& theta, const Frame& frame) const override {
     return position(from_image(frame, 1).transpose() * matrix(theta) * from_image(frame, 0));
@@ -118,29 +77,28 @@ class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
   }
 
  protected:
-  /// Of U diag(cos a, sin a, 0) V^T by small rotations of U and V and by a: seven numbers, rank 2 throughout.
+  /// Of U diag(M, 0) V^T by small rotations of the axes of the two null vectors out of their place, and by M's three directions across it,
+  /// M being 2x2: seven numbers, rank 2 throughout.
   Basis basis(const Position& theta) const override {
-    const Svd svd(matrix(theta), Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Matrix3d& u = svd.matrixU();
-    const Eigen::Matrix3d& v = svd.matrixV();
-    const Eigen::Vector3d s = svd.singularValues();
+    const Axes at(matrix(theta));
     Basis chart(9, 7);
-    for (int k = 0; k < 3; ++k) {
-      chart.col(k) = flat(u * skew(k) * s.asDiagonal() * v.transpose());
-      chart.col(3 + k) = flat(u * s.asDiagonal() * skew(k).transpose() * v.transpose());
+    for (int k = 0; k < 2; ++k) {
+      chart.col(k) = flat(at.left.col(2) * (at.inner.row(k) * at.right.leftCols<2>().transpose()));
+      chart.col(2 + k) = flat((at.left.leftCols<2>() * at.inner.col(k)) * at.right.col(2).transpose());
     }
-    chart.col(6) = flat(u * Eigen::Vector3d(-s[1], s[0], 0).asDiagonal() * v.transpose());
+    for (int k = 0; k < 3; ++k) chart.col(4 + k) = flat(at.left.leftCols<2>() * at.across(k) * at.right.leftCols<2>().transpose());
     return chart;
   }
   Position retract(const Position& theta, const Position& step) const override {
-    const Svd svd(matrix(theta), Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Vector3d s = svd.singularValues();
-    const double angle = std::atan2(s[1], s[0]) + step[6];
-    const Eigen::Matrix3d u = svd.matrixU() * rotation(step.head<3>()), v = svd.matrixV() * rotation(step.segment<3>(3));
-    return position(u * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0).asDiagonal() * v.transpose());
+    const Axes at(matrix(theta));
+    Eigen::Matrix2d inner = at.inner;
+    for (int k = 0; k < 3; ++k) inner += step[4 + k] * at.across(k);
+    const Eigen::Matrix<double, 3, 2> left = tilted(at.left, step.head<2>()), right = tilted(at.right, step.segment<2>(2));
+    return position(left * inner * right.transpose());
   }
 
  private:
+  static constexpr std::size_t kPoints = 7;        // of a minimal sample
   static constexpr double kLeastSlope = 1e-18;     // square of the second singular value of a unit matrix
   static constexpr double kNoDeterminant = 1e-15;  // of a unit matrix
 
@@ -152,79 +110,90 @@ class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
     return c;
   }
   static Vector9 flat(const Matrix& m) { return Eigen::Map<const Vector9>(m.data()); }
-  static Eigen::Matrix3d skew(int axis) {
-    Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
-    m((axis + 2) % 3, (axis + 1) % 3) = 1;
-    m((axis + 1) % 3, (axis + 2) % 3) = -1;
-    return m;
-  }
-  static Eigen::Matrix3d rotation(const Eigen::Vector3d& w) {
-    const double angle = w.norm();
-    return angle > 1e-300 ? Eigen::AngleAxisd(angle, w / angle).toRotationMatrix() : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-  }
 
-  /// Two matrices that span the null space of the seven epipolar constraints; false where it is larger. Elimination, each equation for the
-  /// unknown that weighs most in it: the samples are small and scaled, and a swarm takes a great many of them.
-  static bool pencil(const Eigen::Matrix<double, 3, 7>& a, const Eigen::Matrix<double, 3, 7>& b, Eigen::Matrix3d* f) {
-    constexpr int kRows = 7, kColumns = 9;
-    constexpr double kLeastPivot = 1e-6;
-    double m[kRows][kColumns];
-    for (int i = 0; i < kRows; ++i) {
-      for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < 3; ++c) m[i][3 * r + c] = b(r, i) * a(c, i);
-      }
+  /// Orthonormal axes of each image, the last of them null, and what the matrix is between the other two.
+  struct Axes {
+    Eigen::Matrix3d left, right;
+    Eigen::Matrix2d inner;
+
+    explicit Axes(const Matrix& m) : left(about_null(m.transpose())), right(about_null(m)) {
+      inner = left.leftCols<2>().transpose() * m * right.leftCols<2>();
     }
-    int unknown[kColumns] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
-    for (int k = 0; k < kRows; ++k) {
-      int pivot = k;
-      for (int c = k + 1; c < kColumns; ++c) pivot = std::abs(m[k][c]) > std::abs(m[k][pivot]) ? c : pivot;
-      if (!(std::abs(m[k][pivot]) > kLeastPivot)) return false;
-      if (pivot != k) {
-        for (auto& row : m) std::swap(row[k], row[pivot]);
-        std::swap(unknown[k], unknown[pivot]);
-      }
-      for (int i = k + 1; i < kRows; ++i) {
-        const double share = m[i][k] / m[k][k];
-        for (int c = k + 1; c < kColumns; ++c) m[i][c] -= share * m[k][c];
-      }
+    /// Three unit directions across `inner`, of unit length itself: its products with quaternions.
+    Eigen::Matrix2d across(int k) const {
+      const double a = inner(0, 0), b = inner(0, 1), c = inner(1, 0), d = inner(1, 1);
+      Eigen::Matrix2d by;
+      if (k == 0) by << -b, a, -d, c;
+      if (k == 1) by << -c, d, a, -b;
+      if (k == 2) by << -d, -c, b, a;
+      return by;
     }
-    for (int j = 0; j < 2; ++j) {
-      double x[kColumns] = {};
-      x[kRows + j] = 1;
-      for (int k = kRows - 1; k >= 0; --k) {
-        double sum = m[k][kRows + j];
-        for (int c = k + 1; c < kRows; ++c) sum += m[k][c] * x[c];
-        x[k] = -sum / m[k][k];
+    /// The null vector is perpendicular to every row; the two longest tell it best.
+    static Eigen::Matrix3d about_null(const Matrix& m) {
+      Eigen::Vector3d null = m.row(0).cross(m.row(1)).transpose();
+      for (const int row : {0, 1}) {
+        const Eigen::Vector3d other = m.row(row).cross(m.row(2)).transpose();
+        if (other.squaredNorm() > null.squaredNorm()) null = other;
       }
-      Vector9 null;
-      for (int c = 0; c < kColumns; ++c) null[unknown[c]] = x[c];
       null.normalize();
-      f[j] = Eigen::Map<const Matrix>(null.data());
+      Eigen::Matrix3d axes;
+      axes.col(2) = null;
+      axes.col(0) = null.unitOrthogonal();
+      axes.col(1) = null.cross(axes.col(0));
+      return axes;
     }
-    return true;
+  };
+
+  /// The first two axes once the third has turned by so much towards each of them.
+  static Eigen::Matrix<double, 3, 2> tilted(const Eigen::Matrix3d& axes, const Eigen::Vector2d& by) {
+    const double angle = by.norm();
+    if (!(angle > 1e-300)) return axes.leftCols<2>();
+    const Eigen::Vector2d along = by / angle;
+    // Within the plane of `along` the axes turn; across it they stay.
+    const Eigen::Vector3d towards = axes.leftCols<2>() * along, turned = std::cos(angle) * towards + std::sin(angle) * axes.col(2);
+    return axes.leftCols<2>() + (turned - towards) * along.transpose();
   }
 
-  /// det(f + x g) by its coefficients.
-  static std::array<double, 4> determinant(const Eigen::Matrix3d& f, const Eigen::Matrix3d& g) {
-    const double zero = f.determinant(), all = g.determinant();
-    const double plus = (f + g).determinant(), minus = (f - g).determinant();
-    const double square = (plus + minus) / 2 - zero;
-    return {zero, (plus - minus) / 2 - all, square, all};
+  /// Seven correspondences leave a pencil of matrices, of which up to three have rank 2. Those that put points behind a camera are left
+  /// out; where several remain, the sample itself, taken as a number, decides.
+  void solve(const WorkingPoints& points, std::span<const std::uint32_t> samples, std::span<Position> thetas,
+             std::span<std::uint8_t> found) const {
+    kernels::SevenPointSamples at;
+    kernels::SevenPointPencils pencils;
+    for (std::size_t lane = 0; lane < kernels::kSevenPointLanes; ++lane) {
+      const auto sample = samples.subspan((lane < found.size() ? lane : 0) * kPoints, kPoints);
+      for (std::size_t i = 0; i < kPoints; ++i) {
+        const std::array<double, 4> p = points.row<4>(sample[i]);
+        for (std::size_t c = 0; c < 4; ++c) at.points[i][c][lane] = p[c];
+      }
+    }
+    kernels::solve_seven_points(at, pencils);
+    for (std::size_t lane = 0; lane < found.size(); ++lane) {
+      found[lane] = 0;
+      const unsigned kept = pencils.kept[lane];
+      if (kept == 0) continue;
+      std::size_t number = 0;
+      for (const std::uint32_t i : samples.subspan(lane * kPoints, kPoints)) number = number * 31 + i;
+      auto turn = number % static_cast<std::size_t>(std::popcount(kept));
+      std::size_t root = 0;
+      while ((kept >> root & 1U) == 0 || turn-- > 0) ++root;
+      thetas[lane] = in_working_frame(at, pencils, lane, pencils.root[root][lane]);
+      found[lane] = admit(thetas[lane]) ? 1 : 0;
+    }
   }
 
-  /// Whether all points can lie in front of both cameras: the epipole e' of the second image satisfies e' x y ~ F x with one sign.
-  static bool oriented(const Eigen::Matrix3d& f, const Eigen::Matrix<double, 3, 7>& a, const Eigen::Matrix<double, 3, 7>& b) {
-    // e'^T F = 0: e' is perpendicular to every column of F; the two longest tell it best.
-    Eigen::Vector3d epipole = f.col(0).cross(f.col(1));
-    const Eigen::Vector3d second = f.col(0).cross(f.col(2)), third = f.col(1).cross(f.col(2));
-    if (second.squaredNorm() > epipole.squaredNorm()) epipole = second;
-    if (third.squaredNorm() > epipole.squaredNorm()) epipole = third;
-    const auto ahead = [&](int i) { return epipole.cross(b.col(i)).dot(f * a.col(i)) > 0; };
-    const bool first = ahead(0);
-    for (int i = 1; i < 7; ++i) {
-      if (ahead(i) != first) return false;
-    }
-    return true;
+  /// A matrix of a lane's pencil, about the lane's first correspondence, out of that frame.
+  static Position in_working_frame(const kernels::SevenPointSamples& at, const kernels::SevenPointPencils& pencils, std::size_t lane,
+                                   double x) {
+    Matrix m = Matrix::Zero();
+    for (std::size_t k = 0; k < pencils.one.size(); ++k) m.data()[k] = pencils.one[k][lane] + x * pencils.other[k][lane];
+    const auto& origin = at.points[0];
+    const double first = pencils.scale[0][lane], second = pencils.scale[1][lane];
+    m.leftCols<2>() *= first;
+    m.col(2) -= origin[0][lane] * m.col(0) + origin[1][lane] * m.col(1);
+    m.topRows<2>() *= second;
+    m.row(2) -= origin[2][lane] * m.row(0) + origin[3][lane] * m.row(1);
+    return position(m);
   }
 };
 

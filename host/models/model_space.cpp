@@ -36,6 +36,12 @@ const Kind& row(ModelType type) noexcept {
 
 }  // namespace
 
+void ModelSpace::from_samples(const WorkingPoints& points, std::span<const std::uint32_t> samples, std::span<Position> thetas,
+                              std::span<std::uint8_t> found) const {
+  const auto size = static_cast<std::size_t>(minimal_sample());
+  for (std::size_t k = 0; k < found.size(); ++k) found[k] = from_sample(points, samples.subspan(k * size, size), thetas[k]) ? 1 : 0;
+}
+
 double ModelSpace::noise_variance(const WorkingPoints&, const Weighted& support, const Position&, double squares) const {
   return squares / std::max(1.0, static_cast<double>(support.index.size()) - freedom());
 }

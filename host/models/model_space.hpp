@@ -59,6 +59,11 @@ class ModelSpace {
 
   /// The model through a minimal sample; false if the sample is degenerate (coincident or collinear points).
   virtual bool from_sample(const WorkingPoints& points, std::span<const std::uint32_t> sample, Position& theta) const = 0;
+  /// The same of several samples, one after another in `samples`; found[k] is 1 where the k-th determines a model, else 0.
+  virtual void from_samples(const WorkingPoints& points, std::span<const std::uint32_t> samples, std::span<Position> thetas,
+                            std::span<std::uint8_t> found) const;
+  /// How many samples at a time take hardly longer than one.
+  virtual std::size_t samples_at_once() const noexcept { return 1; }
   /// The velocity at `from` that leads to `to` in one step: the logarithm map.
   virtual void difference(const Position& from, const Position& to, Eigen::Ref<Eigen::VectorXd> velocity) const = 0;
   /// theta moves by velocity (the exponential map) and the velocity is carried along, to stay tangent.

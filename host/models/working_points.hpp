@@ -83,6 +83,22 @@ class WorkingPoints {
     return view;
   }
   double at(std::size_t i, int d) const noexcept { return (view_.at(i, d) - frame_.centre[static_cast<std::size_t>(d)]) / frame_.scale; }
+  /// The point's columns, read at once: for those who read a great many.
+  template <std::size_t D>
+  std::array<double, D> row(std::size_t i) const noexcept {
+    std::array<double, D> p;
+    const char* const at = static_cast<const char*>(view_.data) + i * view_.stride;
+    if (view_.scalar == kernels::Scalar::float64) {
+      std::memcpy(p.data(), at, sizeof p);
+    } else {
+      std::array<float, D> narrow;
+      std::memcpy(narrow.data(), at, sizeof narrow);
+      for (std::size_t d = 0; d < D; ++d) p[d] = static_cast<double>(narrow[d]);
+    }
+    const double share = 1 / frame_.scale;
+    for (std::size_t d = 0; d < D; ++d) p[d] = (p[d] - frame_.centre[d]) * share;
+    return p;
+  }
   template <int D>
   Eigen::Matrix<double, D, 1> point(std::size_t i) const noexcept {
     Eigen::Matrix<double, D, 1> p;

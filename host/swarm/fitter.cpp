@@ -1,5 +1,6 @@
 // The public face of the fit: options and points are checked here, the work is done in multi_model.cpp.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -18,6 +19,7 @@
 #include "host/swarm/noise_scale.hpp"
 #include "host/swarm/settings.hpp"
 #include "host/swarm/settle.hpp"
+#include "host/swarm/two_searches.hpp"
 #include "kernels/evaluators.hpp"
 
 namespace swarmfit {
@@ -106,6 +108,24 @@ struct Fitter::State {
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
   SwarmObserver observer;
+
+  /// One thread each, for two searches side by side.
+  using Pair = std::array<std::unique_ptr<kernels::FitnessEvaluator>, 2>;
+  Pair beside;
+
+  /// Null where two searches are not asked for or must go one after the other: on a device there is but one of, or under an observer's eyes.
+  Expected<const Pair*> evaluators_beside(bool asked) {
+    if (!asked || observer || evaluator->identity().backend != "cpu") return nullptr;
+    for (auto& one : beside) {
+      if (one != nullptr) continue;
+      kernels::EvaluatorOptions alone;
+      alone.threads = 1;
+      auto made = kernels::make_cpu_evaluator(alone);
+      if (!made) return tl::unexpected(swarm::to_error(made.error()));
+      one = std::move(*made);
+    }
+    return &beside;
+  }
 
   /// Takes the options, and makes the back end that they ask for.
   Expected<> open(FitOptions wanted) {
@@ -237,10 +257,26 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     result.threshold = *given;
   }
   swarm::resolve(kinds, options, whole->finite_count(), result.threshold);
-  std::optional<swarm::MultiModel> search(std::in_place, evaluator, kinds, working, part, options.seed, limits, spread);
+  const bool twice = kinds.front().settings.searches > 1 && !searches_part;
+  auto beside = state_->evaluators_beside(twice);
+  if (!beside) return tl::unexpected(beside.error());
+  const bool own_points = *beside != nullptr;
+  std::optional<swarm::MultiModel> search(std::in_place, own_points ? *(**beside)[0] : evaluator, kinds, working, part, options.seed,
+                                          limits, spread);
   search->watched_by(state_->observer ? &watch : nullptr);
-  if (points_set) search->points_are_set();
-  if (auto done = search->run(told, warm_start, result, known); !done) return tl::unexpected(done.error());
+  if (points_set && !own_points) search->points_are_set();
+  if (twice) {
+    std::stop_source stop_again;
+    const std::stop_callback pass_on(limits.stop, [&] { stop_again.request_stop(); });
+    swarm::Limits limits_again = limits;
+    limits_again.stop = stop_again.get_token();
+    swarm::MultiModel again(own_points ? *(**beside)[1] : evaluator, kinds, working, part, options.seed, limits_again, spread);
+    again.watched_by(state_->observer ? &watch : nullptr);
+    auto done = swarm::search_twice(*search, again, stop_again, own_points ? &evaluator : nullptr, told, warm_start, result, known);
+    if (!done) return tl::unexpected(done.error());
+  } else if (auto done = search->run(told, warm_start, result, known); !done) {
+    return tl::unexpected(done.error());
+  }
   std::vector<models::Placed> found = search->found(), hidden = search->hidden();
   const auto tau = static_cast<float>(result.threshold);
   const std::vector<float> allowed = swarm::allowed_by(thin_rows ? swarm::spread_of(options.noise, *whole, depth) : spread, tau);

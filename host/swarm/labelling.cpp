@@ -11,16 +11,17 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kUnit = 4096;        // whole units of energy a point: what graph cuts count in
-constexpr float kFarthest = 2;        // tau: no point is owned from farther away
-constexpr int kAlternations = 10;     // of labels and models
-constexpr int kFailures = 4;          // proposals in all that may join and not lower the energy before the rest is let be
-constexpr double kPromising = 0.5;    // of a model's price that a proposal must save before it is fitted to its points
-constexpr double kLeastFall = 1e-3;   // of the energy that counts as one
-constexpr double kHopeless = 0.5;     // of a model's price: what is dearer by that when refitted once is given up
-constexpr double kCoherent = 0.5;     // share of neighbours alike, beyond chance, from which smoothness counts in full
-constexpr int kCycles = 3;            // of expansions over all labels
-constexpr std::size_t kSmoothed = 6;  // nearest neighbours that a point would agree with
+constexpr double kUnit = 4096;            // whole units of energy a point: what graph cuts count in
+constexpr float kFarthest = 2;            // tau: no point is owned from farther away
+constexpr float kBeyond = 2 * kFarthest;  // tau, bent: of all that are farther away, for which it does not matter how far
+constexpr int kAlternations = 10;         // of labels and models
+constexpr int kFailures = 4;              // proposals in all that may join and not lower the energy before the rest is let be
+constexpr double kPromising = 0.5;        // of a model's price that a proposal must save before it is fitted to its points
+constexpr double kLeastFall = 1e-3;       // of the energy that counts as one
+constexpr double kHopeless = 0.5;         // of a model's price: what is dearer by that when refitted once is given up
+constexpr double kCoherent = 0.5;         // share of neighbours alike, beyond chance, from which smoothness counts in full
+constexpr int kCycles = 3;                // of expansions over all labels
+constexpr std::size_t kSmoothed = 6;      // nearest neighbours that a point would agree with
 
 }  // namespace
 
@@ -32,6 +33,10 @@ std::uint64_t mark_of(std::span<const std::uint32_t> points) {
 
 Labelling::Labelling(const Ground& ground, const Subset& part, const models::Neighbours& neighbours, const LabelPrices& prices)
     : ground_(ground), part_(part), prices_(prices) {
+  if (prices.bend > 0) {
+    per_bend_ = std::log1p(1 / static_cast<float>(prices.bend));
+    farthest_ = unbent(kFarthest * ground.tau) / ground.tau;
+  }
   if (!(prices.smoothness > 0) || neighbours.empty()) return;
   std::map<std::pair<int, int>, int> asked;
   for (std::size_t i = 0; i < part.index().size(); ++i) {
@@ -47,13 +52,14 @@ Labelling::Labelling(const Ground& ground, const Subset& part, const models::Nei
 float Labelling::bent(float distance) const {
   if (!(prices_.bend > 0)) return distance;
   const float bend = static_cast<float>(prices_.bend), far = distance / ground_.tau;
-  return ground_.tau * std::log1p(far / bend) / std::log1p(1 / bend);
+  if (far > farthest_) return kBeyond * ground_.tau;
+  return ground_.tau * std::log1p(far / bend) / per_bend_;
 }
 
 float Labelling::unbent(float cost) const {
   if (!(prices_.bend > 0)) return cost;
   const float bend = static_cast<float>(prices_.bend);
-  return ground_.tau * bend * std::expm1(cost / ground_.tau * std::log1p(1 / bend));
+  return ground_.tau * bend * std::expm1(cost / ground_.tau * per_bend_);
 }
 
 Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const models::Position> models) const {

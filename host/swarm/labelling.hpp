@@ -40,6 +40,9 @@ class Labelling {
   Expected<> start(std::span<const models::Position> models);
   /// Takes in those of the proposals that lower the energy; true if there were any.
   Expected<bool> offer(std::span<const models::Position> proposals);
+  /// Other models take the place of all that are there, where these end at a lower energy; and each side's models are offered to the other's,
+  /// beside them and in place of them.
+  Expected<> contend(std::span<const models::Position> others);
   /// Drops models while that lowers the energy.
   Expected<> drop();
 
@@ -55,6 +58,8 @@ class Labelling {
   double border(std::size_t one, std::size_t other) const;
   /// Marks the points of the cloud that a model owns with 1, and leaves the others as they are.
   void mark_owned(std::size_t model, std::span<float> marks) const;
+  /// How much more alike neighbours are than chance would have it, in [0, 1], over the edges at points that models own.
+  double coherence() const;
   /// A number that tells the set of a model's points from others.
   std::uint64_t owned_set(std::size_t model) const;
 
@@ -88,8 +93,6 @@ class Labelling {
   Expected<bool> try_one(const models::Position& proposal, std::span<const float> distances);
   double cost(std::size_t point) const;
   bool full() const noexcept { return most_ > 0 && state_.models.size() >= most_; }
-  /// How much more alike neighbours are than chance would have it, in [0, 1], over the edges at points that models own.
-  double coherence() const;
   /// Labels and models in turn while the energy falls, or until it is found above `hopeless`.
   Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity());
   /// The state becomes `with`, labelled and fitted, where that lowers the energy.
@@ -106,6 +109,7 @@ class Labelling {
   const Ground& ground_;
   const Subset& part_;
   LabelPrices prices_;
+  float per_bend_ = 0, farthest_ = 0;  // log(1 + 1 / bend), and the farthest distance of a point that may be owned [tau], where they bend
   std::vector<std::pair<std::pair<int, int>, int>> edges_;  // two points, and how many of them ask for the other
   common::PottsEnergy potts_;                               // its edges are those of `edges_` at a price of `potts_smoothness_`
   double potts_smoothness_ = -1;

@@ -181,4 +181,28 @@ Expected<bool> Labelling::join(std::size_t one, std::size_t other, std::span<con
   return adopted;
 }
 
+Expected<> Labelling::contend(std::span<const models::Position> others) {
+  if (others.empty() || (most_ > 0 && others.size() > most_)) return {};
+  auto distances = measure(others);
+  if (!distances) return tl::unexpected(distances.error());
+  std::vector<models::Position> beaten = state_.models;
+  State with;
+  with.models.assign(others.begin(), others.end());
+  with.distances = std::move(*distances);
+  with.fitted.assign(others.size(), 0);
+  auto better = adopt(std::move(with));
+  if (!better) return tl::unexpected(better.error());
+  if (*better) {
+    kept_.assign(state_.models.size(), kJoined);
+  } else {
+    beaten.assign(others.begin(), others.end());
+  }
+  if (beaten.empty()) return {};
+  if (auto joined = offer(beaten); !joined) return tl::unexpected(joined.error());
+  for (std::size_t m = 0; m < state_.models.size(); ++m) {
+    if (auto replaced = replace(m, beaten); !replaced) return tl::unexpected(replaced.error());
+  }
+  return {};
+}
+
 }  // namespace swarmfit::swarm

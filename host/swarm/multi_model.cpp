@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "host/swarm/labelling.hpp"
 #include "host/swarm/noise_model.hpp"
 #include "host/swarm/payment.hpp"
 
@@ -35,6 +36,8 @@ MultiModel::MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kin
   for (const Kind& kind : kinds_) landscapes_.emplace_back(evaluator, *kind.space, points.frame(), kind.settings);
 }
 
+MultiModel::~MultiModel() = default;
+
 void MultiModel::restore_caps() {
   caps_.resize(points_.size());
   for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] = points_.finite(i) ? ground_.allowed_at(i) : 0.0F;
@@ -65,9 +68,14 @@ Expected<> MultiModel::show(std::span<const float> caps) {
   return {};
 }
 
+kernels::Effort MultiModel::effort() const noexcept {
+  const kernels::Effort now = evaluator_.effort(), &before = effort_before_, &beside = effort_beside_;
+  return {now.evaluations - before.evaluations + beside.evaluations, now.point_models - before.point_models + beside.point_models,
+          now.touched - before.touched + beside.touched};
+}
+
 void MultiModel::count_effort(FitResult& result) const {
-  const kernels::Effort effort = evaluator_.effort();
-  const std::uint64_t evaluations = effort.evaluations - effort_before_.evaluations, touched = effort.touched - effort_before_.touched;
+  const auto [evaluations, point_models, touched] = effort();
   result.evaluations = static_cast<std::size_t>(evaluations);
   const double whole = static_cast<double>(evaluations) * static_cast<double>(points_.finite_count()) * settings_.stands_for;
   result.points_touched = whole > 0 ? static_cast<double>(touched) / whole : 1.0;
@@ -80,7 +88,8 @@ Expected<> MultiModel::take(const Candidate& candidate, Outcome outcome, const M
   if (!kept) hidden_.push_back({&space(candidate.kind), candidate.theta});
   looked_flat_ = false;
   if (auto done = deflate(candidate); !done) return done;
-  if (!*go_on) stop_reason_ = "stopped by the caller";
+  stopped_by_caller_ = !*go_on;
+  if (stopped_by_caller_) stop_reason_ = "stopped by the caller";
   return {};
 }
 
@@ -127,6 +136,12 @@ MultiModel::Seeds MultiModel::seeds_from(const std::vector<Model>& warm_start) c
 
 Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
                            std::span<const Known> known) {
+  if (auto done = look_for_models(on_model, warm_start, result, known); !done) return done;
+  return conclude(result);
+}
+
+Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
+                                       std::span<const Known> known) {
   if (points_set_) {
     effort_before_ = evaluator_.effort();
   } else if (auto done = evaluator_.set_points(searched().view()); !done) {
@@ -176,7 +191,13 @@ Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Mode
     saving = best.saving;
   }
   result.stop_reason = stop_reason_;
-  return finish(result);
+  if (!ends_jointly() || !shares_out()) return {};
+  if (auto done = polish(); !done) return done;
+  return share_out();
+}
+
+bool MultiModel::ends_jointly() const {
+  return settings_.joint && !limits_.stop.stop_requested() && (!found_.empty() || (shares_out() && !full()));
 }
 
 bool MultiModel::too_few_left() const {

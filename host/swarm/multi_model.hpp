@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -53,6 +54,9 @@ class MultiModel {
   /// `spread`: how many times the threshold each point may be off (noise_model.hpp); empty: once.
   MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points, const Part& part,
              std::uint64_t seed, Limits limits, std::span<const float> spread = {});
+  ~MultiModel();
+  MultiModel(const MultiModel&) = delete;
+  MultiModel& operator=(const MultiModel&) = delete;
 
   /// Told of each step of each swarm; must outlive this. Null: nobody is.
   void watched_by(Watch* watch) noexcept { watch_ = watch; }
@@ -62,6 +66,18 @@ class MultiModel {
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
   /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.
   Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result, std::span<const Known> known = {});
+  // The same in two parts, for two searches of correspondences that end as one.
+  /// All but the end.
+  Expected<> look_for_models(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
+                             std::span<const Known> known = {});
+  /// The end. `others` are what another search has come to, in the same frame; `effort` is that of its evaluator, where that is another.
+  Expected<> conclude(FitResult& result, std::span<const models::Placed> others = {}, const kernels::Effort& effort = {});
+  /// Of the evaluator, in this search.
+  kernels::Effort effort() const noexcept;
+  /// Has the caller said that there are models enough?
+  bool stopped_by_caller() const noexcept { return stopped_by_caller_; }
+  /// Makes this another search than one of the same seed.
+  void draw_otherwise() noexcept { round_ = kOtherwise; }
   /// The result's models in the frame of the points.
   const std::vector<models::Placed>& found() const noexcept { return found_; }
   /// Flat models that curved ones were taken for; not in the result.
@@ -118,7 +134,7 @@ class MultiModel {
   Expected<> deflate(const Candidate& candidate);
   /// The points of a candidate that was rejected are worth less from now on; it is no neighbour of theirs.
   Expected<> set_aside(const Candidate& candidate);
-  Expected<> finish(FitResult& result);
+  static constexpr std::uint32_t kOtherwise = 1U << 20;  // more swarms than any search flies
   /// Each model refined on what the others leave it, as far as that does not raise the energy of all.
   Expected<> polish();
   Expected<> polish_each();
@@ -133,12 +149,15 @@ class MultiModel {
     double loss = 0;
   };
   Expected<bool> exchange_one(std::size_t kind, std::span<const std::uint32_t> candidates, std::size_t which, Exchange& best);
+  bool ends_jointly() const;
   void tell_parameters(FitResult& result) const;
-  Expected<> share_out(FitResult& result);
+  /// Shares the points out among what swarms have found, and looks for more with an eye to all of them.
+  Expected<> share_out();
+  Expected<> share_out(FitResult& result, std::span<const models::Placed> others);
   Expected<> share_out_locally();
   Expected<> search_further(Labelling& labelling);
-  /// Does one of these pay for itself, beside no other?
-  Expected<bool> any_pays(std::span<const models::Position> models);
+  /// Does one of the joint end's models pay for itself, beside no other?
+  Expected<bool> any_pays(const Labelling& labelling);
   /// Models are replaced, split and joined by samples of their own points while that lowers the joint energy.
   Expected<> regroup(Labelling& labelling);
   Expected<bool> regroup_one(Labelling& labelling, std::size_t model);
@@ -241,6 +260,7 @@ class MultiModel {
   Near near_;
   std::vector<models::Placed> found_, hidden_;
   std::vector<models::Position> proposals_;  // what the joint end may add to them
+  std::unique_ptr<Labelling> labelling_;     // the joint end of correspondences
   std::vector<std::uint16_t> labels_;
   double scale_ = 0;                                     // loss of a model that explains nothing
   std::size_t steps_ = 0;                                // of this round's swarms
@@ -249,7 +269,8 @@ class MultiModel {
   bool looked_flat_ = false;                             // since the last model was found
   Watch* watch_ = nullptr;
   bool points_set_ = false;
-  kernels::Effort effort_before_;  // of the evaluator, in earlier searches
+  bool stopped_by_caller_ = false;
+  kernels::Effort effort_before_, effort_beside_;  // of the evaluator in earlier searches, and of another one
   std::string stop_reason_;
 };
 

@@ -51,19 +51,39 @@ double log_false_alarms(const Support& support, int minimal_sample, double least
   return log_false_alarms(static_cast<double>(support.unexplained), static_cast<double>(support.inliers()), background, minimal_sample);
 }
 
-bool pays(const Support& support, const Settings& settings, int minimal_sample) {
-  constexpr double kLogFalseAlarms = -4.605170185988091;  // log 0.01: one invented model in a hundred clouds of noise
+namespace {
+
+constexpr double kLogFalseAlarms = -4.605170185988091;  // log 0.01: one invented model in a hundred clouds of noise
+
+bool has_enough(const Support& support, const Settings& settings) {
   const auto own = static_cast<double>(support.inliers()), least = static_cast<double>(settings.min_inliers);
-  if (support.inliers() + support.shared < settings.min_inliers || own < kOwnShare * least) return false;
-  // As it would be on the whole cloud.
+  return support.inliers() + support.shared >= settings.min_inliers && own >= kOwnShare * least;
+}
+
+/// Points of the whole cloud that so many stand for.
+std::size_t on_whole_cloud(std::size_t n, const Settings& settings) {
+  return static_cast<std::size_t>(static_cast<double>(n) * settings.stands_for);
+}
+
+}  // namespace
+
+bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample) {
+  if (!has_enough(support, settings)) return false;
   Support whole;
-  const auto scaled = [&](std::size_t n) { return static_cast<std::size_t>(static_cast<double>(n) * settings.stands_for); };
-  whole.unexplained = scaled(support.unexplained);
-  std::transform(support.slabs.begin(), support.slabs.end(), whole.slabs.begin(), scaled);
-  if (log_false_alarms(whole, minimal_sample) < kLogFalseAlarms) return true;
+  whole.unexplained = on_whole_cloud(support.unexplained, settings);
+  std::transform(support.slabs.begin(), support.slabs.end(), whole.slabs.begin(),
+                 [&](std::size_t n) { return on_whole_cloud(n, settings); });
+  return log_false_alarms(whole, minimal_sample) < kLogFalseAlarms;
+}
+
+bool pays(const Support& support, const Settings& settings, int minimal_sample) {
+  if (!has_enough(support, settings)) return false;
+  if (pays_among_others(support, settings, minimal_sample)) return true;
   if (2 * support.beside > support.inliers()) return false;
-  const auto inner = static_cast<double>(scaled(support.inner)), ring = static_cast<double>(whole.inliers()) - inner;
-  return log_false_alarms(static_cast<double>(whole.unexplained), inner, ring, minimal_sample) < kLogFalseAlarms;
+  const auto inner = static_cast<double>(on_whole_cloud(support.inner, settings));
+  const double ring = static_cast<double>(on_whole_cloud(support.inliers(), settings)) - inner;
+  return log_false_alarms(static_cast<double>(on_whole_cloud(support.unexplained, settings)), inner, ring, minimal_sample) <
+         kLogFalseAlarms;
 }
 
 }  // namespace swarmfit::swarm

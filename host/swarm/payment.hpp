@@ -50,4 +50,7 @@ double log_false_alarms(const Support& support, int minimal_sample, double least
 /// where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise.
 bool pays(const Support& support, const Settings& settings, int minimal_sample);
 
+/// The same by what surrounds the candidate alone, whose own ring says little once it was fitted to points that were chosen with it.
+bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample);
+
 }  // namespace swarmfit::swarm

@@ -30,10 +30,11 @@ std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float
 
 }  // namespace
 
-Expected<> MultiModel::finish(FitResult& result) {
-  if (settings_.joint && !limits_.stop.stop_requested() && (!found_.empty() || (shares_out() && !full()))) {
+Expected<> MultiModel::conclude(FitResult& result, std::span<const models::Placed> others, const kernels::Effort& effort) {
+  effort_beside_ = effort;
+  if (labelling_ != nullptr) return share_out(result, others);
+  if (ends_jointly()) {
     if (auto done = polish(); !done) return done;
-    if (shares_out()) return share_out(result);
     // With many points the polished models are where the joint refit would leave them.
     if (!part_searched_) {
       if (auto energy = refine_jointly(ground_, found_); !energy) return tl::unexpected(energy.error());

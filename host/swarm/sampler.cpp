@@ -74,25 +74,66 @@ bool Sampler::nearby(std::size_t first, std::span<const std::uint32_t> words, st
   return true;
 }
 
-bool Sampler::draw(bool local, std::uint32_t round, std::uint32_t step, std::uint32_t particle, models::Position& theta) const {
-  const auto wanted = static_cast<std::size_t>(space_.minimal_sample());
-  std::array<std::uint32_t, 8> sample{}, words{};
-  for (std::uint32_t attempt = 0; attempt < kAttempts; ++attempt) {
-    for (std::uint32_t block = 0; block < (wanted + kWords - 1) / kWords; ++block) {
-      const auto four = random_.words(Draw::sample, round, step * 2 + block, particle * kAttempts + attempt);
-      std::copy(four.begin(), four.end(), words.begin() + kWords * block);
-    }
-    const std::size_t first = Random::below(words[0], live_.size());
-    sample[0] = live_[first];
-    const std::span<std::uint32_t> others(sample.data() + 1, wanted - 1);
-    const bool near = local && nearby(first, std::span(words).subspan(1), others);
-    for (std::size_t k = 1; k < wanted; ++k) {
-      if (!near) sample[k] = live_[Random::below(words[k], live_.size())];
-    }
-    for (std::size_t k = 0; k < wanted; ++k) sample[k] = candidates_[sample[k]];
-    if (space_.from_sample(points_, std::span<const std::uint32_t>(sample.data(), wanted), theta)) return true;
+void Sampler::choose(const Ask& ask, std::uint32_t round, std::uint32_t step, std::uint32_t attempt,
+                     std::span<std::uint32_t> sample) const {
+  const auto blocks = static_cast<std::uint32_t>((sample.size() + kWords - 1) / kWords);
+  std::array<std::uint32_t, 8> words{};
+  for (std::uint32_t block = 0; block < blocks; ++block) {
+    const auto four = random_.words(Draw::sample, round, step * 2 + block, ask.particle * kAttempts + attempt);
+    std::copy(four.begin(), four.end(), words.begin() + kWords * block);
   }
-  return false;
+  const std::size_t first = Random::below(words[0], live_.size());
+  sample[0] = live_[first];
+  const bool near = ask.local && nearby(first, std::span(words).subspan(1), sample.subspan(1));
+  for (std::size_t k = 1; k < sample.size(); ++k) {
+    if (!near) sample[k] = live_[Random::below(words[k], live_.size())];
+  }
+  for (std::uint32_t& place : sample) place = candidates_[place];
+}
+
+void Sampler::draw(std::span<const Ask> asks, std::uint32_t round, std::uint32_t step, std::span<models::Position> thetas,
+                   std::span<std::uint8_t> drawn) const {
+  const auto wanted = static_cast<std::size_t>(space_.minimal_sample());
+  const std::size_t at_once = space_.samples_at_once();
+  std::fill(drawn.begin(), drawn.end(), std::uint8_t{0});
+  std::vector<std::uint32_t> left(asks.size()), samples;
+  std::iota(left.begin(), left.end(), 0U);
+  std::vector<models::Position> found;
+  std::vector<std::uint8_t> sound;
+  for (std::uint32_t attempt = 0; attempt < kAttempts && !left.empty();) {
+    // Where few are left, several attempts of each fill what is solved at a time; the first that succeeds counts, as if made one by one.
+    const auto ahead = static_cast<std::uint32_t>(std::max<std::size_t>(1, at_once / left.size()));
+    const std::uint32_t attempts = std::min(kAttempts - attempt, ahead);
+    const std::size_t count = left.size() * attempts;
+    samples.resize(count * wanted);
+    found.resize(count);
+    sound.resize(count);
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto more = static_cast<std::uint32_t>(k % attempts);
+      choose(asks[left[k / attempts]], round, step, attempt + more, std::span(samples).subspan(k * wanted, wanted));
+    }
+    space_.from_samples(points_, samples, found, sound);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::uint32_t ask = left[k / attempts];
+      if (sound[k] == 0 || drawn[ask] != 0) continue;
+      thetas[ask] = found[k];
+      drawn[ask] = 1;
+    }
+    left.erase(std::remove_if(left.begin(), left.end(), [&](std::uint32_t ask) { return drawn[ask] != 0; }), left.end());
+    attempt += attempts;
+  }
+}
+
+std::vector<models::Position> Sampler::draw_some(std::uint32_t count, std::uint32_t local_every, std::uint32_t round) const {
+  std::vector<Ask> asks(count);
+  for (std::uint32_t k = 0; k < count; ++k) asks[k] = {k, k % local_every == 0};
+  std::vector<models::Position> thetas(count), found;
+  std::vector<std::uint8_t> drawn(count);
+  draw(asks, round, 0, thetas, drawn);
+  for (std::size_t k = 0; k < thetas.size(); ++k) {
+    if (drawn[k] != 0) found.push_back(thetas[k]);
+  }
+  return found;
 }
 
 }  // namespace swarmfit::swarm

@@ -18,8 +18,17 @@ class Sampler {
   Sampler(const models::WorkingPoints& points, std::span<const std::uint32_t> candidates, const models::Neighbours& neighbours,
           const models::ModelSpace& space, const Random& random);
 
-  /// A model through a sample. `local`: of nearby points. False if some tens of samples were all degenerate.
-  bool draw(bool local, std::uint32_t round, std::uint32_t step, std::uint32_t particle, models::Position& theta) const;
+  /// Whose sample is drawn.
+  struct Ask {
+    std::uint32_t particle = 0;
+    bool local = false;  ///< of nearby points
+  };
+  /// A model through a sample for each that asks. `drawn` is 0 where some tens of samples were all degenerate, else 1. What one gets has
+  /// nothing to do with who else asks.
+  void draw(std::span<const Ask> asks, std::uint32_t round, std::uint32_t step, std::span<models::Position> thetas,
+            std::span<std::uint8_t> drawn) const;
+  /// Models through `count` samples, of every `local_every` of them the first a local one; fewer where some are degenerate.
+  std::vector<models::Position> draw_some(std::uint32_t count, std::uint32_t local_every, std::uint32_t round) const;
 
   /// Leaves out candidates whose cap, one a candidate, has sunk below `least`, as long as enough remain.
   void prefer_unexplained(std::span<const float> caps, float least);
@@ -34,6 +43,8 @@ class Sampler {
   const models::WorkingPoints& points_;
   const models::ModelSpace& space_;
   const Random& random_;
+  /// The points of one attempt at a sample.
+  void choose(const Ask& ask, std::uint32_t round, std::uint32_t step, std::uint32_t attempt, std::span<std::uint32_t> sample) const;
   /// Fills places with others near the live candidate at `first`; false where too few are live.
   bool nearby(std::size_t first, std::span<const std::uint32_t> words, std::span<std::uint32_t> places) const;
 

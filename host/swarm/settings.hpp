@@ -43,6 +43,7 @@ struct Settings {
   Loss loss = Loss::truncated_l1;
   int threads = 0;              ///< that move a swarm whose samples take long; 0: as many as the machine has
   int patience = 2;             ///< swarms in a row whose best does not pay before the fit ends
+  int searches = 1;             ///< of the whole, one or two, whose models the joint end chooses from
   bool refine = true;           ///< least squares on the inliers of what converged
   bool joint = true;            ///< refine all models together at the end
   bool sharpen = true;          ///< where points are few, the joint end goes all the way to the least absolute deviations

@@ -12,6 +12,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr int kRegroupings = 4;                  // rounds; what has not changed since it was looked at is not looked at again
+constexpr double kTogether = 0.57;               // of coherence: neighbours among strewn outliers agree less, those of bodies more
 constexpr int kSamples = 50, kJoinSamples = 20;  // of the points of one model, and of two
 
 }  // namespace
@@ -45,32 +46,47 @@ Expected<> MultiModel::search_further(Labelling& labelling) {
   return {};
 }
 
-Expected<bool> MultiModel::any_pays(std::span<const models::Position> models) {
+Expected<bool> MultiModel::any_pays(const Labelling& labelling) {
+  // A model that was fitted to points chosen with it has few just beyond them, be they strewn. So its ring may tell that it pays only where
+  // its points lie together as those of one thing do.
+  const bool together = labelling.coherence() >= kTogether;
+  if (together && !found_.empty()) return true;
   restore_caps();
-  for (const models::Position& theta : models) {
+  for (const models::Position& theta : labelling.models()) {
     Candidate candidate;
     candidate.theta = theta;
     if (auto done = look(candidate, 0); !done) return tl::unexpected(done.error());
-    if (pays(candidate.support, settings_, space(0).minimal_sample())) return true;
+    if ((together ? pays : pays_among_others)(candidate.support, settings_, space(0).minimal_sample())) return true;
   }
   return false;
 }
 
-Expected<> MultiModel::share_out(FitResult& result) {
-  Labelling labelling(ground_, part_, neighbours_, settings_.prices);
-  labelling.bound(limits_.max_models);
+Expected<> MultiModel::share_out() {
+  labelling_ = std::make_unique<Labelling>(ground_, part_, neighbours_, settings_.prices);
+  labelling_->bound(limits_.max_models);
   std::vector<models::Position> start;
   for (const models::Placed& model : found_) start.push_back(model.theta);
-  if (auto done = labelling.start(start); !done) return done;
-  if (auto joined = labelling.offer(proposals_); !joined) return tl::unexpected(joined.error());
-  if (auto done = search_further(labelling); !done) return done;
-  if (auto done = regroup(labelling); !done) return done;
+  if (auto done = labelling_->start(start); !done) return done;
+  if (auto joined = labelling_->offer(proposals_); !joined) return tl::unexpected(joined.error());
+  if (auto done = search_further(*labelling_); !done) return done;
+  return regroup(*labelling_);
+}
+
+Expected<> MultiModel::share_out(FitResult& result, std::span<const models::Placed> others) {
+  Labelling& labelling = *labelling_;
+  std::vector<models::Position> rivals;
+  for (const models::Placed& model : others) rivals.push_back(model.theta);
+  if (auto done = labelling.contend(rivals); !done) return done;
   if (auto done = labelling.drop(); !done) return done;
-  if (found_.empty()) {
-    // Swarms that found nothing may yet have flown through models that the joint end makes out. One of these must then pay as any must.
-    auto paid = any_pays(labelling.models());
-    if (!paid) return tl::unexpected(paid.error());
-    if (!*paid) return {};
+  // Swarms that found nothing may yet have flown through models that the joint end makes out, and what one of them took for a model it may
+  // have made more of than there is.
+  auto paid = any_pays(labelling);
+  if (!paid) return tl::unexpected(paid.error());
+  if (!*paid) {
+    found_.clear();
+    result.models.clear();
+    count_effort(result);
+    return {};
   }
   found_.clear();
   for (const models::Position& theta : labelling.models()) found_.push_back({&space(0), theta});
@@ -91,11 +107,8 @@ Expected<> MultiModel::share_out(FitResult& result) {
 std::vector<models::Position> MultiModel::samples_of(std::span<const float> marks, int count, std::vector<models::Position> samples) {
   Sampler sampler(points_, part_.index(), neighbours_, space(0), random_);
   if (!sampler.keep_to(marks)) return {};
-  const std::uint32_t round = round_++;
-  for (int k = 0; k < count; ++k) {
-    models::Position theta;
-    if (sampler.draw(k % 2 == 0, round, 0, static_cast<std::uint32_t>(k), theta)) samples.push_back(std::move(theta));
-  }
+  const std::vector<models::Position> drawn = sampler.draw_some(static_cast<std::uint32_t>(count), 2, round_++);
+  samples.insert(samples.end(), drawn.begin(), drawn.end());
   return samples;
 }
 

@@ -190,11 +190,7 @@ Expected<std::optional<Halves>> crossing_pair(const Ground& part, const Suspect&
 
   const models::Neighbours none;
   const Sampler sampler(part.points, places.own, none, part.space, random);
-  std::vector<models::Position> planes;
-  for (std::uint32_t k = 0; k < kSamples; ++k) {
-    models::Position theta;
-    if (sampler.draw(true, kFirstSplit + number, 0, k, theta)) planes.push_back(std::move(theta));
-  }
+  std::vector<models::Position> planes = sampler.draw_some(kSamples, 1, kFirstSplit + number);
   const Neighbourhood there(part, places.around);
   std::vector<float> savings;
   std::vector<kernels::Evidence> evidence;

@@ -43,12 +43,12 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   const std::size_t m = positions_.size();
   const auto local = static_cast<std::size_t>(settings_.local_share * static_cast<double>(m));
   std::vector<std::uint8_t> placed(m, 1);
-  for_particles([&](std::size_t j) {
-    if (j < seeds.size()) {
-      positions_[j] = seeds[j];
-    } else {
-      placed[j] = sampler.draw(j % m < local, round, 0, static_cast<std::uint32_t>(j), positions_[j]) ? 1 : 0;
-    }
+  const std::size_t seeded = std::min(seeds.size(), m);
+  std::copy_n(seeds.begin(), seeded, positions_.begin());
+  for_particles([&](std::size_t first, std::size_t last) {
+    std::vector<Sampler::Ask> asks;
+    for (std::size_t j = std::max(first, seeded); j < last; ++j) asks.push_back({static_cast<std::uint32_t>(j), j < local});
+    put_at_samples(sampler, asks, std::span(placed).subspan(last - asks.size(), asks.size()));
   });
   // Data that yield no sample at first hardly yield one later.
   if (placed[0] == 0) return false;
@@ -124,13 +124,20 @@ void Swarm::share_work(kernels::FitnessEvaluator& evaluator) {
   workers_ = worth_waking || evaluator.shares(positions_.size()) ? &evaluator : nullptr;
 }
 
-void Swarm::for_particles(const std::function<void(std::size_t)>& body) const {
-  const std::size_t count = positions_.size(), at_once = workers_ == nullptr ? count : space_.costly_samples() ? 8 : 16;
-  const auto some = [&](std::size_t k) {
-    for (std::size_t j = k * at_once; j < std::min(count, (k + 1) * at_once); ++j) body(j);
-  };
+void Swarm::for_particles(const std::function<void(std::size_t, std::size_t)>& body) const {
+  const std::size_t count = positions_.size(), samples = 2 * space_.samples_at_once();
+  const std::size_t at_once = workers_ == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 16;
+  const auto some = [&](std::size_t k) { body(k * at_once, std::min(count, (k + 1) * at_once)); };
   if (workers_ == nullptr) return some(0);
   workers_->share_out((count + at_once - 1) / at_once, some);
+}
+
+void Swarm::put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask> asks, std::span<std::uint8_t> placed) {
+  std::vector<models::Position> thetas(asks.size());
+  sampler.draw(asks, round_, static_cast<std::uint32_t>(steps_), thetas, placed);
+  for (std::size_t k = 0; k < asks.size(); ++k) {
+    if (placed[k] != 0) positions_[asks[k].particle] = thetas[k];
+  }
 }
 
 void Swarm::move(const Sampler& sampler) {
@@ -139,8 +146,21 @@ void Swarm::move(const Sampler& sampler) {
     if (own_best_[j].size() == 0) own_best_[j] = positions_[j];
   }
   if (together_) return fly_together();
-  for_particles([&](std::size_t j) {
-    if (!renew(sampler, j)) fly(j);
+  for_particles([&](std::size_t first, std::size_t last) {
+    std::vector<Sampler::Ask> asks;
+    for (std::size_t j = first; j < last; ++j) {
+      if (is_renewed(j)) asks.push_back({static_cast<std::uint32_t>(j), (j & 1U) != 0 && settings_.local_share > 0});
+    }
+    std::vector<std::uint8_t> placed(asks.size());
+    put_at_samples(sampler, asks, placed);
+    for (std::size_t j = first, k = 0; j < last; ++j) {
+      const bool asked = k < asks.size() && asks[k].particle == j;
+      if (asked && placed[k++] != 0) {
+        velocities_[j].setZero();
+      } else {
+        fly(j);
+      }
+    }
   });
 }
 
@@ -178,15 +198,11 @@ std::array<std::uint32_t, 4> Swarm::factors(std::size_t j, std::size_t d) const 
                        static_cast<std::uint32_t>(j) * 16 + static_cast<std::uint32_t>(d / 2));
 }
 
-bool Swarm::renew(const Sampler& sampler, std::size_t j) {
+bool Swarm::is_renewed(std::size_t j) const noexcept {
   const std::size_t m = positions_.size();
   const auto renewed = static_cast<std::size_t>(settings_.renewal_share * static_cast<double>(m));
   // The renewed places rotate through the ring, so that every neighbourhood is refreshed in turn.
-  if (renewed == 0 || (j + static_cast<std::size_t>(steps_) * renewed) % m >= renewed) return false;
-  const bool local = (j & 1U) != 0 && settings_.local_share > 0;
-  if (!sampler.draw(local, round_, static_cast<std::uint32_t>(steps_), static_cast<std::uint32_t>(j), positions_[j])) return false;
-  velocities_[j].setZero();
-  return true;
+  return renewed > 0 && (j + static_cast<std::size_t>(steps_) * renewed) % m < renewed;
 }
 
 void Swarm::fly(std::size_t j) {

@@ -58,15 +58,17 @@ class Swarm {
  private:
   void remember();
   void move(const Sampler& sampler);
-  /// Puts a particle whose turn it is at a new sample; false where it is not, or the data yield none.
-  bool renew(const Sampler& sampler, std::size_t particle);
+  /// Is it a particle's turn to start anew from a sample?
+  bool is_renewed(std::size_t particle) const noexcept;
   void fly(std::size_t particle);
   /// The same for all of a swarm at once, where kernels know how.
   void fly_together();
   /// The random r1 and r2 of Eq. (1) for a particle's entries d and d + 1, at this step.
   std::array<std::uint32_t, 4> factors(std::size_t particle, std::size_t d) const;
-  /// What the body does with one particle must not matter to another.
-  void for_particles(const std::function<void(std::size_t)>& body) const;
+  /// Puts particles at samples of their own: placed[k] is 0, and the k-th stays where it is, where the data yield none.
+  void put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask> asks, std::span<std::uint8_t> placed);
+  /// body(first, last) for runs of particles, side by side. What it does with one particle must not matter to another.
+  void for_particles(const std::function<void(std::size_t, std::size_t)>& body) const;
   const models::Position& attractor(std::size_t particle) const;
 
   const models::ModelSpace& space_;
