@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <thread>
 
 #include <fmt/format.h>
 
@@ -272,7 +273,9 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
     limits_again.stop = stop_again.get_token();
     swarm::MultiModel again(own_points ? *(**beside)[1] : evaluator, kinds, working, part, options.seed, limits_again, spread);
     again.watched_by(state_->observer ? &watch : nullptr);
-    auto done = swarm::search_twice(*search, again, stop_again, own_points ? &evaluator : nullptr, told, warm_start, result, known);
+    const bool at_once = options.threads != 1 && std::thread::hardware_concurrency() > 1;
+    const auto how = !own_points ? swarm::Together::on_one_evaluator : at_once ? swarm::Together::at_once : swarm::Together::in_turn;
+    auto done = swarm::search_twice(*search, again, stop_again, how, told, warm_start, result, known);
     if (!done) return tl::unexpected(done.error());
   } else if (auto done = search->run(told, warm_start, result, known); !done) {
     return tl::unexpected(done.error());

@@ -8,16 +8,20 @@
 #include <swarmfit/fit.hpp>
 
 #include "host/swarm/multi_model.hpp"
-#include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::swarm {
 
-/// Runs `first`, and `again` by other random numbers, and ends the first with what both have found. Where `workers` is not null each has an
-/// evaluator of its own, and they go side by side on the threads of `workers`, the first on the caller's; else they have the same one, and go
-/// one after the other. The result is the same. Callbacks and a warm start are the first's alone; where the caller has enough, the second
-/// is told to stop, by `stop_again` that its limits know, and does not count.
-Expected<> search_twice(MultiModel& first, MultiModel& again, std::stop_source& stop_again, kernels::FitnessEvaluator* workers,
-                        const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
-                        std::span<const Known> known);
+/// How two searches share what they work on.
+enum class Together {
+  on_one_evaluator,  ///< one after the other
+  in_turn,           ///< on one each, one after the other
+  at_once,           ///< on one each, the second in a thread of its own, if there is one to be had
+};
+
+/// Runs `first`, and `again` by other random numbers, and ends the first with what both have found. The result does not depend on `how`.
+/// The first runs in the caller's thread; callbacks and a warm start are its alone. Where the caller has enough, the second is told to stop,
+/// by `stop_again` that its limits know, and does not count.
+Expected<> search_twice(MultiModel& first, MultiModel& again, std::stop_source& stop_again, Together how, const ModelCallback& on_model,
+                        const std::vector<Model>& warm_start, FitResult& result, std::span<const Known> known);
 
 }  // namespace swarmfit::swarm
