@@ -67,12 +67,13 @@ def tell(*command):
 cpu = re.search(r"model name\s*:\s*(.*)", open("/proc/cpuinfo").read())
 family = re.search(r"cpu family\s*:\s*(.*)\nmodel\s*:\s*(.*)", open("/proc/cpuinfo").read())
 name = (cpu.group(1) if cpu else platform.machine()) + (f" (family {family.group(1)}, model {family.group(2)})" if family else "")
-system = re.search(r'PRETTY_NAME="(.*)"', open("/etc/os-release").read()).group(1) + ", Linux " + platform.release()
+system = re.search(r'PRETTY_NAME="(.*)"', open("/etc/os-release").read()).group(1) + ", Linux " + platform.release().split("-")[0]
 devices = [line.strip() for line in tell(os.environ["SWARMFIT"], "devices").splitlines() if line.startswith("vulkan")]
 json.dump({"processor": name, "cores": os.cpu_count(), "system": system,
            "compiler": (tell(os.environ.get("CXX", "c++"), "--version").splitlines() or ["?"])[0],
            "vulkan": re.sub(r"\s+", " ", "; ".join(devices)) or "none",
-           "commit": tell("git", "describe", "--always", "--dirty", "--exclude=*"), "load": f"{os.getloadavg()[0]:.1f}"},
+           # The page that this rewrites is no change to what was measured.
+           "commit": tell("git", "describe", "--always", "--exclude=*") + ("-dirty" if tell("git", "status", "--porcelain", "--", ".", ":!docs") else ""), "load": f"{os.getloadavg()[0]:.1f}"},
           open(1, "w"), indent=1)
 END
 }
