@@ -29,6 +29,14 @@ struct Memory {
     ++live;
     return block;
   }
+  /// The same, null where there is none.
+  static void* get_or_null(std::size_t bytes, std::size_t alignment) noexcept {
+    try {
+      return get(bytes, alignment);
+    } catch (const std::bad_alloc&) {
+      return nullptr;
+    }
+  }
   static void give(void* block) noexcept {
     if (block == nullptr) return;
     --live;
@@ -67,6 +75,18 @@ void* operator new(std::size_t bytes, std::align_val_t alignment) {
 void* operator new[](std::size_t bytes, std::align_val_t alignment) {
   return swarmfit::tests::Memory::get(bytes, static_cast<std::size_t>(alignment));
 }
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return swarmfit::tests::Memory::get_or_null(bytes, 0); }
+void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept { return swarmfit::tests::Memory::get_or_null(bytes, 0); }
+void* operator new(std::size_t bytes, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+  return swarmfit::tests::Memory::get_or_null(bytes, static_cast<std::size_t>(alignment));
+}
+void* operator new[](std::size_t bytes, std::align_val_t alignment, const std::nothrow_t&) noexcept {
+  return swarmfit::tests::Memory::get_or_null(bytes, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* block, const std::nothrow_t&) noexcept { swarmfit::tests::Memory::give(block); }
+void operator delete[](void* block, const std::nothrow_t&) noexcept { swarmfit::tests::Memory::give(block); }
+void operator delete(void* block, std::align_val_t, const std::nothrow_t&) noexcept { swarmfit::tests::Memory::give(block); }
+void operator delete[](void* block, std::align_val_t, const std::nothrow_t&) noexcept { swarmfit::tests::Memory::give(block); }
 void operator delete(void* block) noexcept { swarmfit::tests::Memory::give(block); }
 void operator delete[](void* block) noexcept { swarmfit::tests::Memory::give(block); }
 void operator delete(void* block, std::size_t) noexcept { swarmfit::tests::Memory::give(block); }
