@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 /// How long a helper without work looks for more: longer than whatever a fit does by itself between two passes over its points.
 constexpr auto kAwake = std::chrono::microseconds(1000);
 /// How long helpers are waited for at the end; they go as soon as they have a thread to go with.
-constexpr auto kPatience = std::chrono::seconds(1);
+constexpr auto kPatience = std::chrono::milliseconds(100);
 /// Looks before a thread that waits lets others have its processor, each time it looks in vain.
 constexpr int kLooks = 2000;
 
