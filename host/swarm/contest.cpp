@@ -56,7 +56,8 @@ double MultiModel::worth(double saved, int freedom) const {
 }
 
 double MultiModel::worth(const Candidate& candidate) const {
-  return worth(saving(candidate.kind, candidate.theta, caps_, candidate.distances), space(candidate.kind).freedom());
+  const double saved = bare_saving(caps_, candidate.distances) * agreement(candidate.kind, candidate.theta, caps_, candidate.distances);
+  return worth(saved, space(candidate.kind).freedom());
 }
 
 double MultiModel::agreement(std::size_t kind, const models::Position& theta, std::span<const float> caps,
@@ -136,11 +137,6 @@ bool MultiModel::is_cornered(const Candidate& candidate) const {
     }
   }
   return apart < kEven * square;
-}
-
-double MultiModel::saving(std::size_t kind, const models::Position& theta, std::span<const float> caps,
-                          std::span<const float> distances) const {
-  return bare_saving(caps, distances) * agreement(kind, theta, caps, distances);
 }
 
 double MultiModel::bare_saving(std::span<const float> caps, std::span<const float> distances) const {
@@ -250,12 +246,12 @@ Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat
   constexpr int kFlats = 2, kFaces = 4;
   const std::size_t kind = flat_kind(winner.kind);
   std::vector<float> caps = own_caps(caps_, winner.distances), distances(caps.size());
-  const double own = worth(saving(winner.kind, winner.theta, caps, winner.distances), space(winner.kind).freedom());
+  const double bare = bare_saving(caps, winner.distances);
+  const double own = worth(bare * agreement(winner.kind, winner.theta, caps, winner.distances), space(winner.kind).freedom());
   const double share = gathered(winner);
   const bool strewn = share < kGathered || is_strewn(winner);
   // Normals near the edges of a thin box are those of a cylinder: there the distances alone decide.
   const bool cornered = !strewn && is_cornered(winner);
-  const double bare = bare_saving(caps, winner.distances);
   const int asked = share < kWellGathered ? kFaces : kFlats, most = cornered ? kFaces : asked;
   double together = 0, bare_together = 0;
   for (int flats = 1; flats <= most; ++flats) {
@@ -265,10 +261,10 @@ Expected<bool> MultiModel::bends(const Candidate& winner, models::Position& flat
     if (!*there) return !strewn;
     if (flats == 1) flat = theta;
     if (strewn) return false;
-    together += saving(kind, theta, caps, distances);
-    const double theirs = worth(together, flats * space(kind).freedom());
-    if (flats <= asked && own <= kClearly * theirs) return false;
-    bare_together += bare_saving(caps, distances);
+    const double theirs_bare = bare_saving(caps, distances);
+    together += theirs_bare * agreement(kind, theta, caps, distances);
+    bare_together += theirs_bare;
+    if (flats <= asked && own <= kClearly * worth(together, flats * space(kind).freedom())) return false;
     if (cornered && bare <= kAsGood * bare_together) return false;
     take_nearer(distances, caps);
   }

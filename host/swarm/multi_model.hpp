@@ -221,9 +221,7 @@ class MultiModel {
   bool is_cornered(const Candidate& candidate) const;
   /// Sum over points of what a model saves [data unit].
   double bare_saving(std::span<const float> caps, std::span<const float> distances) const;
-  /// The same, as far as they lie along it.
-  double saving(std::size_t kind, const models::Position& theta, std::span<const float> caps, std::span<const float> distances) const;
-  /// The same of the part's points, in thresholds.
+  /// The same of the part's points, in thresholds, times agreement().
   double saving_along(std::size_t kind, const models::Position& theta, std::span<const float> distances) const;
   std::size_t flat_kind(std::size_t curved) const noexcept;
   /// Is there a flat kind that was not asked for? It is the last.
