@@ -21,8 +21,8 @@ struct BatchItem {
   std::span<float> costs;
 };
 
-/// As many FitnessEvaluators as there are problems, but for evaluate(), which asks all that have something to ask at once. A problem's costs
-/// are those that it has alone, to the byte, whatever the others ask.
+/// As many FitnessEvaluators as there are problems, but for evaluate(), which asks all that have something to ask at once. A problem's
+/// costs are those that it has alone, to the byte, whatever the others ask.
 /// Not thread-safe, but for this: while nobody evaluates, different threads may set points and caps of different problems.
 class BatchEvaluator {
  public:

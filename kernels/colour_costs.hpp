@@ -54,16 +54,16 @@ class ColourCosts {
 
   virtual const Identity& identity() const noexcept = 0;
 
-  /// costs[i] of the i-th of `colours`, in [0, 1]; 1 where the sample is empty. `neighbours` is K, in [1, kMostNeighbours]; the sample's size
-  /// where that is less. costs.size() == colours.size(). Fails with `invalid` where sizes differ or K is out of its bounds.
+  /// costs[i] of the i-th of `colours`, in [0, 1]; 1 where the sample is empty. `neighbours` is K, in [1, kMostNeighbours]; the sample's
+  /// size where that is less. costs.size() == colours.size(). Fails with `invalid` where sizes differ or K is out of its bounds.
   virtual Result<> evaluate(const ColoursView& sample, int neighbours, const ColoursView& colours, std::span<float> costs) const = 0;
 };
 
 /// The bounds of evaluate's arguments, checked alike by every back end.
 Result<> check_colours(const ColoursView& sample, int neighbours, const ColoursView& colours, std::span<const float> costs);
 
-/// On the back end and device of an evaluator, as its identity names them. `choose`: smaller workloads go to the processor's cores even where
-/// that is a GPU, which takes longer to be asked than they take to do. Fails with `unavailable`.
+/// On the back end and device of an evaluator, as its identity names them. `choose`: smaller workloads go to the processor's cores even
+/// where that is a GPU, which takes longer to be asked than they take to do. Fails with `unavailable`.
 Result<std::unique_ptr<ColourCosts>> make_colour_costs(const Identity& where, bool choose, const EvaluatorOptions& options);
 
 // One factory a back end, each defined in its own folder.

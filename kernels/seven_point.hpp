@@ -16,9 +16,9 @@ struct SevenPointSamples {
   alignas(64) std::array<std::array<Lanes, 4>, 7> points;
 };
 
-/// Of each lane, the pencil of matrices that seven epipolar constraints leave, F = one + x other, up to scale and in a frame of the sample's
-/// own: its first correspondence is the origin of both images and the others are about one from it; (3, 3) is 0 there. Row by row, the last
-/// entry left out.
+/// Of each lane, the pencil of matrices that seven epipolar constraints leave, F = one + x other, up to scale and in a frame of the
+/// sample's own: its first correspondence is the origin of both images and the others are about one from it; (3, 3) is 0 there. Row by row,
+/// the last entry left out.
 struct SevenPointPencils {
   using Lanes = SevenPointSamples::Lanes;
   alignas(64) std::array<Lanes, 8> one, other;

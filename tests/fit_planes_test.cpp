@@ -70,7 +70,8 @@ TEST(FitPlanes, TwoFacesThatMeetAreNoPlaneBetweenThem) {
   }
 }
 
-// A mat beside a floor whose noise comes near the threshold: as far from the floor's plane as the floor's own tail, but in a place of its own.
+// A mat beside a floor whose noise comes near the threshold: as far from the floor's plane as the floor's own tail, but in a place of its
+// own.
 TEST(FitPlanes, WhatLiesBesideANoisySurfaceIsNotItsTail) {
   const Eigen::Vector3d mat(2, 0, 0.021), a(0.25, 0, 0), b(0, 1, 0);
   Scene scene;

@@ -306,8 +306,8 @@ double relative_nees(ModelType type, int outliers) {
 }
 
 TEST(Fit, CovarianceIsThatOfWhatIsDelivered) {
-  // 400 fits tell the mean to 7 % (two deviations). Least squares' own covariance would be off by 57 %, and by another 9 % of the noise that
-  // the threshold hides.
+  // 400 fits tell the mean to 7 % (two deviations). Least squares' own covariance would be off by 57 %, and by another 9 % of the noise
+  // that the threshold hides.
   EXPECT_NEAR(relative_nees(ModelType::line2d, 0), 1, 0.15);
   EXPECT_NEAR(relative_nees(ModelType::plane, 0), 1, 0.15);
   EXPECT_NEAR(relative_nees(ModelType::line2d, 100), 1, 0.2);

@@ -21,7 +21,8 @@
 #include "tests/io_files.hpp"
 #include "tests/perception_fixture.hpp"
 
-/// For LeakSanitizer, where there is one: OpenCV takes an image's pixels first and then what holds them, and where that fails they are lost.
+/// For LeakSanitizer, where there is one: OpenCV takes an image's pixels first and then what holds them, and where that fails they are
+/// lost.
 extern "C" __attribute__((visibility("default"))) const char* __lsan_default_suppressions();
 extern "C" const char* __lsan_default_suppressions() { return "leak:cv::Mat::create\n"; }
 
@@ -31,8 +32,8 @@ namespace {
 using tests::Failing;
 using tests::Memory;
 
-/// `call` gives an Expected. Each of many requests fails, alone and with all that follow. `growth`: how many are left out. `kept`: blocks that
-/// threads which come and go may keep for their next work.
+/// `call` gives an Expected. Each of many requests fails, alone and with all that follow. `growth`: how many are left out. `kept`: blocks
+/// that threads which come and go may keep for their next work.
 template <class Call, class Same>
 void expect_error_or_the_same(Call&& call, Same&& same, double growth = 1.1, long kept = 0) {
   const auto whole = call();

@@ -1,4 +1,5 @@
-// A small camera over a table with boxes and bowls: organised clouds with a known truth, in the camera's frame (x right, y down, z forward).
+// A small camera over a table with boxes and bowls: organised clouds with a known truth, in the camera's frame (x right, y down, z
+// forward).
 #pragma once
 
 #include <cmath>

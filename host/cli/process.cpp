@@ -18,8 +18,8 @@ namespace swarmfit::cli {
 
 namespace {
 
-/// What the first arrays are put into comes in large pages where the system gives them on request: a small one costs a fault of a microsecond
-/// or two for each 4 KiB. Takes no memory before it is written to.
+/// What the first arrays are put into comes in large pages where the system gives them on request: a small one costs a fault of a
+/// microsecond or two for each 4 KiB. Takes no memory before it is written to.
 void ask_for_large_pages() {
 #if defined(__GLIBC__) && defined(MADV_HUGEPAGE)
   constexpr std::size_t kRoom = std::size_t{96} << 20, kPage = std::size_t{2} << 20;  // [bytes]

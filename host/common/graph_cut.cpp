@@ -130,8 +130,9 @@ void PottsEnergy::find_takers(Piece& piece) {
     for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[of_label(choice.label)->last++] = {i, choice.cost};
 }
 
-/// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. What a pair (i, j), i < j, costs at (x_i, x_j) is split into a part of
-/// x_i alone, V(1,0) - V(0,0), a part of x_j alone, -V(1,0), and the rest V(0,1) + V(1,0) - V(0,0) at (0, 1) (Kolmogorov and Zabih 2004).
+/// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. What a pair (i, j), i < j, costs at (x_i, x_j) is split into a part
+/// of x_i alone, V(1,0) - V(0,0), a part of x_j alone, -V(1,0), and the rest V(0,1) + V(1,0) - V(0,0) at (0, 1) (Kolmogorov and Zabih
+/// 2004).
 void PottsEnergy::set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take,
                                  std::span<const Label> labels) {
   for (std::size_t k = 0; k < part.size(); ++k) {

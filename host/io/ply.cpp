@@ -74,8 +74,8 @@ const char* step_over_all(const PlyElement& element, const char* at, const char*
 }
 
 /// Vertices with lists have no fixed size: their wanted properties are copied out first.
-Expected<> gather_with_lists(const std::filesystem::path& file, const PlyElement& vertex, const WantedProperties& wanted, std::string_view payload,
-                             bool swapped, Cloud& cloud) {
+Expected<> gather_with_lists(const std::filesystem::path& file, const PlyElement& vertex, const WantedProperties& wanted,
+                             std::string_view payload, bool swapped, Cloud& cloud) {
   std::vector<const char*> starts(vertex.properties.size());
   const char* at = payload.data();
   const char* end = at + payload.size();

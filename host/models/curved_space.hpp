@@ -36,7 +36,8 @@ class SupportRows {
   std::vector<double> kept_;
 };
 
-/// A kind whose residual is linearised around a position, as `Linearised` does. Chart: `freedom()` numbers near 0, the position itself being 0.
+/// A kind whose residual is linearised around a position, as `Linearised` does. Chart: `freedom()` numbers near 0, the position itself
+/// being 0.
 class CurvedSpace : public ModelSpace {
  public:
   static constexpr int kMostFreedom = 8;
@@ -70,8 +71,8 @@ class CurvedSpace : public ModelSpace {
 };
 
 /// The sums of a kind whose sizes are known at compile time: they run over every point of the support at each step, and are most of what a
-/// refinement takes. `Kind` has `bool linearise(row, theta, Linear&) const`, row the point's columns, false where the residual is not defined
-/// at this point, which then has no say.
+/// refinement takes. `Kind` has `bool linearise(row, theta, Linear&) const`, row the point's columns, false where the residual is not
+/// defined at this point, which then has no say.
 template <class Kind, class Base, int Components, int Parameters>
 class Linearised : public Base {
  protected:

@@ -18,8 +18,8 @@
 
 namespace swarmfit::models {
 
-/// A position: the model's parameters in the working frame. A velocity has the same number of entries. Short enough to lie in place: a swarm
-/// moves thousands of them.
+/// A position: the model's parameters in the working frame. A velocity has the same number of entries. Short enough to lie in place: a
+/// swarm moves thousands of them.
 using Position = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kernels::kMaxParameters, 1>;
 
 /// Points and weights of a least-squares problem.

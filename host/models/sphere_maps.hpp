@@ -1,5 +1,5 @@
-// Unit vectors as points of a sphere: the shortest way from one to another, and where a way leads. A swarm asks for both at every step of every
-// particle, so short ways go by series instead of by angles.
+// Unit vectors as points of a sphere: the shortest way from one to another, and where a way leads. A swarm asks for both at every step of
+// every particle, so short ways go by series instead of by angles.
 #pragma once
 
 #include <cmath>
@@ -24,8 +24,8 @@ Vector way_between(const Vector& n, const Vector& m) {
   return across * (std::atan2(sine, cosine) / sine);
 }
 
-/// Moves unit `n` along tangent `v`, a quarter turn at most: the exponential map. `v`, first made tangent, is carried along: it keeps its length
-/// and its angle to the way.
+/// Moves unit `n` along tangent `v`, a quarter turn at most: the exponential map. `v`, first made tangent, is carried along: it keeps its
+/// length and its angle to the way.
 template <class Vector>
 void follow(Vector& n, Vector& v) {
   constexpr double kQuarterTurn = 1.5707963267948966;

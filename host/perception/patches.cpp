@@ -100,8 +100,8 @@ void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, fl
   }
 }
 
-/// The flattest neighbourhoods first: a patch should start in the middle of a face. Digit by digit: the bits of floats >= 0 are in the order
-/// of their values.
+/// The flattest neighbourhoods first: a patch should start in the middle of a face. Digit by digit: the bits of floats >= 0 are in the
+/// order of their values.
 void sort_by_variation(const CoarseGrid& coarse, std::vector<std::uint32_t>& seeds) {
   constexpr int kBits = 11;
   constexpr std::uint32_t kMask = (1U << kBits) - 1;

@@ -113,8 +113,8 @@ LocalPlane fit_both(const Overview& overview, const std::vector<std::uint16_t>& 
   return fit_plane(overview.cells.points, members, old.normal.cast<double>()).plane();
 }
 
-/// What joins two planes, where they are alike: most cells of the smaller lie within tau, or the sensor's noise at their range, of the larger,
-/// and together they have more cells within tau than the larger alone.
+/// What joins two planes, where they are alike: most cells of the smaller lie within tau, or the sensor's noise at their range, of the
+/// larger, and together they have more cells within tau than the larger alone.
 std::optional<LocalPlane> common_plane(const Overview& overview, float tau, const std::vector<std::uint16_t>& labels,
                                        const std::vector<LocalPlane>& planes, std::size_t small, std::size_t large) {
   std::size_t cells = 0, near = 0, of_large = 0, of_both = 0;

@@ -12,11 +12,12 @@
 
 namespace swarmfit::perception {
 
-/// How many cells of unknown direction one of known direction counts for when planes are fitted: a slab through clutter is made of the former.
+/// How many cells of unknown direction one of known direction counts for when planes are fitted: a slab through clutter is made of the
+/// former.
 inline constexpr std::size_t kWeightOfKnown = 6;
 
-/// Least squares over those of the `chosen` cells that lie within tau [m] of the plane and are known to lie along it; the plane itself where
-/// they are too few. Its normal turns to at most `most_angle` [rad] from `up`.
+/// Least squares over those of the `chosen` cells that lie within tau [m] of the plane and are known to lie along it; the plane itself
+/// where they are too few. Its normal turns to at most `most_angle` [rad] from `up`.
 LocalPlane refine_on_known(const Overview& overview, std::span<const std::uint32_t> chosen, const LocalPlane& plane, float tau,
                            const Eigen::Vector3d& up, double most_angle);
 

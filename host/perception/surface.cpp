@@ -84,7 +84,8 @@ double principal_length(const Points2& points) {
   return high - low;
 }
 
-/// Of a bitmap row after row: 1 where a cell in the square of `before` cells to the left and above and `after` to the right and below is set.
+/// Of a bitmap row after row: 1 where a cell in the square of `before` cells to the left and above and `after` to the right and below is
+/// set.
 std::vector<std::uint8_t> widen(const std::vector<std::uint8_t>& set, int columns, int rows, int before, int after) {
   const auto sweep = [&](const std::vector<std::uint8_t>& from, int lines, std::size_t line, int length, std::size_t step) {
     std::vector<std::uint8_t> to(from.size(), 0);

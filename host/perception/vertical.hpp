@@ -34,13 +34,13 @@ Vertical vertical_from_tilt(double tilt);
 std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, double horizontal_angle);
 
 /// The direction that best accounts for surfaces and edges together, for where planes alone do not decide: surfaces lie across it or, as
-/// walls, along it, upright edges meet in its vanishing point, and cameras are seldom rolled. `normals` are of cells of the view, towards the
-/// camera, zero where unknown. A plane that lies across the direction tells it exactly. Without edges as above.
+/// walls, along it, upright edges meet in its vanishing point, and cameras are seldom rolled. `normals` are of cells of the view, towards
+/// the camera, zero where unknown. A plane that lies across the direction tells it exactly. Without edges as above.
 std::optional<Vertical> vertical_from_planes(const PointGrid& grid, std::span<const Model> planes, const ImageEdges& edges,
                                              std::span<const Eigen::Vector3f> normals, double horizontal_angle);
 
-/// Whether further planes, of `left` inliers in all, leave that vertical as it is: one that an upright camera could see as a floor or a table
-/// outweighs whatever is not of its direction.
+/// Whether further planes, of `left` inliers in all, leave that vertical as it is: one that an upright camera could see as a floor or a
+/// table outweighs whatever is not of its direction.
 bool is_vertical_decided(const PointGrid& grid, std::span<const Model> planes, std::size_t left, double horizontal_angle);
 
 }  // namespace swarmfit::perception

@@ -12,8 +12,8 @@
 
 namespace swarmfit::report {
 
-/// What is told of each step, and in `particles` float32 numbers: a step after another, of each the particles' parameters, one particle after
-/// another. Parameters are about `centre`, so that float32 holds them. Kinds of point pairs have no parameters here.
+/// What is told of each step, and in `particles` float32 numbers: a step after another, of each the particles' parameters, one particle
+/// after another. Parameters are about `centre`, so that float32 holds them. Kinds of point pairs have no parameters here.
 struct Replay {
   nlohmann::json steps;
   Bytes particles;

@@ -43,7 +43,8 @@ std::vector<double> cosines_of(const Ground& part, std::span<const Eigen::Vector
   return cosines;
 }
 
-/// Caps of the points by which a model is to be refined: what they may be off, or 0 of those that do not lie along it. None where too few do.
+/// Caps of the points by which a model is to be refined: what they may be off, or 0 of those that do not lie along it. None where too few
+/// do.
 std::vector<float> caps_along(const Ground& part, std::span<const double> cosines, std::span<const float> distances) {
   std::vector<float> caps(cosines.size());
   std::size_t own = 0, along = 0;

@@ -114,7 +114,8 @@ struct Fitter::State {
   using Pair = std::array<std::unique_ptr<kernels::FitnessEvaluator>, 2>;
   Pair beside;
 
-  /// Null where two searches are not asked for or must go one after the other: on a device there is but one of, or under an observer's eyes.
+  /// Null where two searches are not asked for or must go one after the other: on a device there is but one of, or under an observer's
+  /// eyes.
   Expected<const Pair*> evaluators_beside(bool asked) {
     if (!asked || observer || evaluator->identity().backend != "cpu") return nullptr;
     for (auto& one : beside) {

@@ -40,8 +40,8 @@ class Labelling {
   Expected<> start(std::span<const models::Position> models);
   /// Takes in those of the proposals that lower the energy; true if there were any.
   Expected<bool> offer(std::span<const models::Position> proposals);
-  /// Other models take the place of all that are there, where these end at a lower energy; and each side's models are offered to the other's,
-  /// beside them and in place of them.
+  /// Other models take the place of all that are there, where these end at a lower energy; and each side's models are offered to the
+  /// other's, beside them and in place of them.
   Expected<> contend(std::span<const models::Position> others);
   /// Drops models while that lowers the energy.
   Expected<> drop();

@@ -29,7 +29,8 @@ class Landscape {
   /// Adds a found optimum to O of Eq. (5); without effect on the fitness under residual deflation, whose caps are the evaluator's.
   void deflate_around(const models::Position& optimum) { optima_.push_back(optimum); }
 
-  /// From now on a fitness tells what a model saves beyond chance: without that a wide circle among outliers is as good as a small true one.
+  /// From now on a fitness tells what a model saves beyond chance: without that a wide circle among outliers is as good as a small true
+  /// one.
   void expect(const Background& background) { background_ = background; }
 
   /// fitness[j] of positions[j], exact where it is below bests[j]. Sizes must be equal.

@@ -37,7 +37,8 @@ class Along {
   std::size_t size() const noexcept { return all_.size(); }
   std::uint32_t point(std::size_t place) const noexcept { return all_[place].point; }
 
-  /// Places of the points nearest to that at a place, itself left out; where two are as near, the one that comes first on the walk outwards.
+  /// Places of the points nearest to that at a place, itself left out; where two are as near, the one that comes first on the walk
+  /// outwards.
   std::size_t near(std::size_t place, std::array<std::uint32_t, kNear>& nearest) const {
     if (dimension_ == 2) return near_in<2>(place, nearest);
     if (dimension_ == 3) return near_in<3>(place, nearest);
@@ -173,7 +174,8 @@ class Reach {
   }
 
   /// How many points' worth the model's share as a whole is beside what is near a point: the more, the less the shares along the model
-  /// differ beyond what chance makes of so few neighbours. They are taken to be beta distributed, and their variance tells (method of moments).
+  /// differ beyond what chance makes of so few neighbours. They are taken to be beta distributed, and their variance tells (method of
+  /// moments).
   double worth_of_whole(double share) const {
     double differs = 0, by_chance = 0;
     for (const Asked& one : asked_) {

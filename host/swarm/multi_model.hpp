@@ -49,8 +49,8 @@ struct Watch {
 /// compete in contest.cpp; the joint end in polish.cpp and, where models share their points out, in share_out.cpp.
 class MultiModel {
  public:
-  /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are drawn
-  /// from, and where the settings say so what swarms search. `evaluator` is given what is searched. `kinds` must outlive this.
+  /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are
+  /// drawn from, and where the settings say so what swarms search. `evaluator` is given what is searched. `kinds` must outlive this.
   /// `spread`: how many times the threshold each point may be off (noise_model.hpp); empty: once.
   MultiModel(kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, const models::WorkingPoints& points, const Part& part,
              std::uint64_t seed, Limits limits, std::span<const float> spread = {});

@@ -29,15 +29,15 @@ struct Support {
 /// Of tau: a point is unexplained while its cap is at least that.
 inline constexpr float kUnexplained = 0.5F;
 
-/// Of the points that a model must have: at least so many nobody else may explain; the others it may have from found models that it is nearer
-/// to these points than.
+/// Of the points that a model must have: at least so many nobody else may explain; the others it may have from found models that it is
+/// nearer to these points than.
 inline constexpr double kOwnShare = 0.8;
 
 /// What a model at these distances saves of what the points may cost, in the caps' unit. NaN saves nothing.
 double saved(std::span<const float> caps, std::span<const float> distances);
 
-/// NaN distances count for nothing. `beside` and `nearest` are empty or one a point, as in Near (deflation.hpp), and without `nearest` no point
-/// is shared; `before` is of the points that come before these.
+/// NaN distances count for nothing. `beside` and `nearest` are empty or one a point, as in Near (deflation.hpp), and without `nearest` no
+/// point is shared; `before` is of the points that come before these.
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside = {},
                       const Support& before = {}, std::span<const float> nearest = {});
 
@@ -46,8 +46,8 @@ Support count_support(std::span<const float> distances, std::span<const float> c
 /// sample of the points). Lower is more meaningful. `least_background`: points that surroundings put into a slab at least.
 double log_false_alarms(const Support& support, int minimal_sample, double least_background = 0);
 
-/// Two surfaces side by side are each other's surroundings, and neither would pay. So the ring from tau / 2 to tau may be the background as well,
-/// where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise.
+/// Two surfaces side by side are each other's surroundings, and neither would pay. So the ring from tau / 2 to tau may be the background as
+/// well, where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise.
 bool pays(const Support& support, const Settings& settings, int minimal_sample);
 
 /// The same by what surrounds the candidate alone, whose own ring says little once it was fitted to points that were chosen with it.

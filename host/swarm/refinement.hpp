@@ -84,15 +84,16 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
             models::Position& theta);
 
 /// Least absolute deviations, by reweighting, on the points that are not better explained already (distance below their cap), repeated
-/// while the truncated loss falls, `rounds` times at most. Returns the loss of theta; it never rises. `distances`, where not null, gets those
-/// to the outcome.
+/// while the truncated loss falls, `rounds` times at most. Returns the loss of theta; it never rises. `distances`, where not null, gets
+/// those to the outcome.
 Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds = kMostRounds,
                             std::vector<float>* distances = nullptr);
 
 /// Distances of the ground's points to each of several models, of whatever kinds; NaN where a point is not finite.
 Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models);
 
-/// What the other models leave of each of the ground's points: its tau, or the distance to the nearest of them. `distances` as by measure().
+/// What the other models leave of each of the ground's points: its tau, or the distance to the nearest of them. `distances` as by
+/// measure().
 void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps);
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].

@@ -32,7 +32,8 @@ class Sampler {
 
   /// Leaves out candidates whose cap, one a candidate, has sunk below `least`, as long as enough remain.
   void prefer_unexplained(std::span<const float> caps, float least);
-  /// Draws from candidates of which marks, one a point, are not 0 alone; false, and nothing changes, where these are hardly more than a sample.
+  /// Draws from candidates of which marks, one a point, are not 0 alone; false, and nothing changes, where these are hardly more than a
+  /// sample.
   bool keep_to(std::span<const float> marks);
 
  private:

@@ -15,15 +15,15 @@
 namespace swarmfit::swarm {
 
 /// Input indices of at most `size` finite points, in input order: one drawn from each of equal runs, so that a scan or an image is covered
-/// evenly. All finite points where there are no more. Parts of different `number` are drawn independently. `workers`, here and below, may be
-/// null: whose threads share the work.
+/// evenly. All finite points where there are no more. Parts of different `number` are drawn independently. `workers`, here and below, may
+/// be null: whose threads share the work.
 inline constexpr std::uint32_t kSearchedPart = 0, kThinnedPart = 1;
 std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
                                      kernels::FitnessEvaluator* workers = nullptr);
 
 /// The same of a cloud whose points are worth the less the more `spread`, one a point and >= 1, says their noise is: each is drawn with a
-/// probability that falls as 1 / spread, so that what a model saves on them is, on average, counted in units of each point's own noise. `size`
-/// of them on average, each by itself.
+/// probability that falls as 1 / spread, so that what a model saves on them is, on average, counted in units of each point's own noise.
+/// `size` of them on average, each by itself.
 std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
                                             std::size_t size, std::span<const float> spread);
 

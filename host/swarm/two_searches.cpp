@@ -8,8 +8,8 @@
 namespace swarmfit::swarm {
 namespace {
 
-/// `here` in this thread and, meanwhile, `beside` in another; after it where no thread can be had. What either throws is thrown here; where that
-/// is `here`, `beside` is asked to stop.
+/// `here` in this thread and, meanwhile, `beside` in another; after it where no thread can be had. What either throws is thrown here; where
+/// that is `here`, `beside` is asked to stop.
 void run_beside(const std::function<void()>& here, const std::function<void()>& beside, std::stop_source& stop_beside) {
   std::exception_ptr thrown;
   std::jthread other;

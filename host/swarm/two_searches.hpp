@@ -19,8 +19,8 @@ enum class Together {
 };
 
 /// Runs `first`, and `again` by other random numbers, and ends the first with what both have found. The result does not depend on `how`.
-/// The first runs in the caller's thread; callbacks and a warm start are its alone. Where the caller has enough, the second is told to stop,
-/// by `stop_again` that its limits know, and does not count.
+/// The first runs in the caller's thread; callbacks and a warm start are its alone. Where the caller has enough, the second is told to
+/// stop, by `stop_again` that its limits know, and does not count.
 Expected<> search_twice(MultiModel& first, MultiModel& again, std::stop_source& stop_again, Together how, const ModelCallback& on_model,
                         const std::vector<Model>& warm_start, FitResult& result, std::span<const Known> known);
 

@@ -335,8 +335,8 @@ using BlockTag = hn::CappedTag<float, kTileBlocks>;
 using BlockVector = hn::Vec<BlockTag>;
 
 /// The lower bound of a block's cost, of blocks side by side; see BlockBounds for the fields. With dmax the largest |d| that the box
-/// admits, min(|d|, c) >= |d| min(1, c / dmax), and sum |d| is at least |sum s_i d_i| for any signs, and sum d^2 / dmax. A curved surface is
-/// taken for its tangent plane, with its bend for `slack`; farther than from one end of the block to the other no distance can change.
+/// admits, min(|d|, c) >= |d| min(1, c / dmax), and sum |d| is at least |sum s_i d_i| for any signs, and sum d^2 / dmax. A curved surface
+/// is taken for its tangent plane, with its bend for `slack`; farther than from one end of the block to the other no distance can change.
 template <class Model, Loss loss>
 struct BlockBounder {
   static constexpr std::size_t D = Model::traits.dimension;

@@ -30,8 +30,9 @@ struct TileView {
 };
 
 /// How losses are summed. Exact: `scale` quanta a unit of cost, a power of two; a block's lane sums are rounded to whole ones, so that sums
-/// over blocks may be taken in any order, and by any number of threads, with the same outcome. A block's losses stay below 2^27 quanta. Where
-/// caps are so much larger than the cloud that quanta would be too coarse, `scale` is 0, and floating point is added up in a fixed order.
+/// over blocks may be taken in any order, and by any number of threads, with the same outcome. A block's losses stay below 2^27 quanta.
+/// Where caps are so much larger than the cloud that quanta would be too coarse, `scale` is 0, and floating point is added up in a fixed
+/// order.
 struct Summing {
   Loss loss = Loss::truncated_l1;
   float scale = 0;
@@ -44,7 +45,8 @@ struct Field {
 };
 
 /// Bounds of a tile's blocks side by side. Blocks that are not there are beyond every model's reach and cost nothing. `side_offset` and
-/// `side_sum` are one more set of signs as BlockBounds has them: on which side of the best model so far each point is, 0 before there is one.
+/// `side_sum` are one more set of signs as BlockBounds has them: on which side of the best model so far each point is, 0 before there is
+/// one.
 struct TileBounds {
   alignas(64) float field[Field::all][kTileBlocks];
   alignas(64) std::int32_t cap_units[kTileBlocks];  ///< cost of a block whose points are all beyond their caps
@@ -90,12 +92,12 @@ struct CpuKernels {
   const char* name;
   std::size_t lanes;
 
-  /// values[j] += the losses of the tile's points to model j, for at most kGroupModels models with `coefficients` row after row, in floating
-  /// point. A model's sum does not depend on the others.
+  /// values[j] += the losses of the tile's points to model j, for at most kGroupModels models with `coefficients` row after row, in
+  /// floating point. A model's sum does not depend on the others.
   void (*add_values)(ModelKind kind, Loss loss, const TileView& tile, const float* coefficients, std::size_t models, double* values);
 
-  /// The same in quanta, in lanes: kMaxLanes numbers a model, on a cache line. `blocks`: null for all, else a bit a block for each model. Lanes
-  /// hold what `lanes` tiles cost.
+  /// The same in quanta, in lanes: kMaxLanes numbers a model, on a cache line. `blocks`: null for all, else a bit a block for each model.
+  /// Lanes hold what `lanes` tiles cost.
   void (*add_units)(ModelKind kind, const Summing& summing, const TileView& tile, const float* coefficients, std::size_t models,
                     const std::uint8_t* blocks, std::int32_t* lane_units);
 

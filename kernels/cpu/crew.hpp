@@ -24,7 +24,8 @@ class Crew {
     void (*finish)(void* context, std::size_t member);
   };
   /// work.body for each task, in any order and on any thread, and work.finish of each member that took part, the last of its doing. No two
-  /// threads are the same member, of `threads()`, at a time; the caller is the first. The first exception is thrown here, when all have ended.
+  /// threads are the same member, of `threads()`, at a time; the caller is the first. The first exception is thrown here, when all have
+  /// ended.
   void run(std::size_t tasks, const Work& work, void* context);
 
  private:

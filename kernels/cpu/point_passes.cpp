@@ -36,8 +36,8 @@ bool read_row(const PointsView& points, std::size_t row, Pivot& x) {
   return probe == 0;
 }
 
-/// A place among the strip's points: the median, a column, of three of them, so that a stray does not cost the others their precision. False
-/// if none of the rows looked at is finite.
+/// A place among the strip's points: the median, a column, of three of them, so that a stray does not cost the others their precision.
+/// False if none of the rows looked at is finite.
 template <class S>
 bool choose_pivot(const PointsView& points, std::size_t first, std::size_t count, Pivot& pivot) {
   constexpr std::size_t kAsked = 3, kProbes = 16;

@@ -31,7 +31,8 @@ class OpenGroup {
 
  private:
   void bound(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, Loss loss);
-  /// What blocks of one sort cost the models that are alive: stretch by stretch, in place of their bounds, as long as a model may still win.
+  /// What blocks of one sort cost the models that are alive: stretch by stretch, in place of their bounds, as long as a model may still
+  /// win.
   void add(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,
            std::uint8_t Open::*blocks, double PartialBound::*least, std::span<float> costs);
   void add_stretch(const CpuKernels& kernels, const PointStore& points, const CentredSwarm& swarm, const Summing& summing,

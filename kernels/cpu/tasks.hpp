@@ -31,8 +31,8 @@ inline Crew*& current_crew() noexcept {
 /// Threads that tasks are shared out to where this is called.
 inline std::size_t workers() noexcept { return current_crew() != nullptr ? static_cast<std::size_t>(current_crew()->threads()) : 1; }
 
-/// body(task, member) for each task on the threads of the crew, which are members below `workers()`; here where there is none. A member that
-/// finds no more tasks ends with finish(member).
+/// body(task, member) for each task on the threads of the crew, which are members below `workers()`; here where there is none. A member
+/// that finds no more tasks ends with finish(member).
 template <class Body, class Finish>
 void for_each_task_as_member(std::size_t tasks, Body&& body, Finish&& finish) {
   if (Crew* crew = current_crew(); crew != nullptr) {

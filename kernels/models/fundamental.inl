@@ -14,8 +14,8 @@ struct Fundamental {
     Matrix3::divide(k, std::sqrt(square));
   }
 
-  /// Sampson distance |x2^T F x1| / |((F x1)_0, (F x1)_1, (F^T x2)_0, (F^T x2)_1)|; infinite where both points are epipoles. 17 multiply-adds,
-  /// a square root and a division.
+  /// Sampson distance |x2^T F x1| / |((F x1)_0, (F x1)_1, (F^T x2)_0, (F^T x2)_1)|; infinite where both points are epipoles. 17
+  /// multiply-adds, a square root and a division.
   template <class Math, class V>
   static SWARMFIT_INLINE V residual(const Math m, const V* x, const V* k) {
     const V a = m.mul_add(x[0], k[0], m.mul_add(x[1], k[1], k[2]));

@@ -1,4 +1,5 @@
-// Own models on the processor: the user's function in double precision, which makes the reference and, on several threads, the CPU back end.
+// Own models on the processor: the user's function in double precision, which makes the reference and, on several threads, the CPU back
+// end.
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -1,10 +1,10 @@
 // What went wrong, in words that name the field, the value and the bound. The library never throws on purpose, prints or exits.
 //
-// What is thrown inside a call that gives an Expected becomes its Error: out_of_memory where memory, or a thread, could not be had. A Fitter
-// or a Perceiver can be used again, and goes on as if the call had not been; files that were to be written are not there. An exception of
-// the caller's own function (a ModelCallback, a SwarmObserver, a benchmark's progress) ends the call and comes back to the caller as it was
-// thrown; those of an OwnModel's functions, which run on several threads, become the fit's error. Calls that give no Expected let
-// std::bad_alloc through, and so do validate() and model_type().
+// What is thrown inside a call that gives an Expected becomes its Error: out_of_memory where memory, or a thread, could not be had. A
+// Fitter or a Perceiver can be used again, and goes on as if the call had not been; files that were to be written are not there. An
+// exception of the caller's own function (a ModelCallback, a SwarmObserver, a benchmark's progress) ends the call and comes back to the
+// caller as it was thrown; those of an OwnModel's functions, which run on several threads, become the fit's error. Calls that give no
+// Expected let std::bad_alloc through, and so do validate() and model_type().
 #pragma once
 
 #include <string>

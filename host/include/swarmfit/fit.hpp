@@ -101,8 +101,8 @@ struct FitResult {
 /// Holds a back end; reuse it over frames. Not thread-safe; one a thread.
 class SWARMFIT_API Fitter {
  public:
-  /// Fails with invalid_option, backend_unavailable or out_of_memory. An own model's GLSL that does not compile is an invalid_option with the
-  /// compiler's words, where the back end is a Vulkan device.
+  /// Fails with invalid_option, backend_unavailable or out_of_memory. An own model's GLSL that does not compile is an invalid_option with
+  /// the compiler's words, where the back end is a Vulkan device.
   static Expected<Fitter> create(const FitOptions& options);
   ~Fitter();
   Fitter(Fitter&&) noexcept;

@@ -38,11 +38,11 @@ struct PerceiveOptions {
   std::size_t min_soi_points = 300;  ///< smaller groups are debris (for a 640 x 480 frame; scaled by the image's size)
   double soi_margin = 1.15;          ///< the bounding sphere is larger than the group by this factor, >= 1
   Segmentation segmentation = Segmentation::graphcut;
-  int colour_neighbours = 0;         ///< K of the colour cost, >= 0; 0 takes it from the sample's size
-  double uncertain_cost = 0;         ///< fixed cost of the third label, in (0, 1); 0: the default of the preset
-  double smoothness = 0;             ///< weight of the boundary term, > 0; 0: the default of the preset
-  std::filesystem::path gallery;     ///< folder: one image, or a folder of images, a name; empty: no recognition
-  bool track = false;                ///< frames follow each other: the last one's planes seed the search, planes and SOIs keep their ids
+  int colour_neighbours = 0;      ///< K of the colour cost, >= 0; 0 takes it from the sample's size
+  double uncertain_cost = 0;      ///< fixed cost of the third label, in (0, 1); 0: the default of the preset
+  double smoothness = 0;          ///< weight of the boundary term, > 0; 0: the default of the preset
+  std::filesystem::path gallery;  ///< folder: one image, or a folder of images, a name; empty: no recognition
+  bool track = false;             ///< frames follow each other: the last one's planes seed the search, planes and SOIs keep their ids
 
   /// Fails with invalid_option, naming the field, its value and its bound.
   SWARMFIT_API Expected<> validate() const;
@@ -90,8 +90,8 @@ class SWARMFIT_API Perceiver {
   Perceiver& operator=(Perceiver&&) noexcept;
 
   /// An organised coloured cloud goes through the whole chain; without colour or grid the stages that need them are left
-  /// out. `on_plane` is told of planes as they are found; the result has them refined on all points, joined and chosen. Fails with bad_input
-  /// (Cloud::validate(), another dimension than 3, fewer than 3 finite points, a coordinate beyond 1e18), backend_unavailable or
+  /// out. `on_plane` is told of planes as they are found; the result has them refined on all points, joined and chosen. Fails with
+  /// bad_input (Cloud::validate(), another dimension than 3, fewer than 3 finite points, a coordinate beyond 1e18), backend_unavailable or
   /// out_of_memory.
   Expected<PerceiveResult> perceive(const Cloud& frame, const ModelCallback& on_plane = {}, std::stop_token stop = {});
 

@@ -17,7 +17,8 @@
 namespace swarmfit::adapters {
 
 /// The matrix's own memory: H x W of 2, 3 or 4 channels (what reprojectImageTo3D gives, what findContours takes), a point an element; or
-/// N x D of one channel, a point a row. CV_32F or CV_64F. Fails with bad_input for anything else, and for an image with gaps between its rows.
+/// N x D of one channel, a point a row. CV_32F or CV_64F. Fails with bad_input for anything else, and for an image with gaps between its
+/// rows.
 inline Expected<PointsView> view(const cv::Mat& matrix) {
   const auto complain = [](const std::string& what) { return fail(Error::Kind::bad_input, "the matrix " + what); };
   if (matrix.dims != 2) return complain("has " + std::to_string(matrix.dims) + " dimensions, must have 2");
@@ -44,8 +45,8 @@ PointsView view(const std::vector<cv::Vec<Scalar, Size>>& points) {
   return PointsView({points.empty() ? nullptr : points.front().val, Size * points.size()}, Size);
 }
 
-/// What matches two images' points, for homographies and fundamental matrices: view(pairs(first, second)) would look at memory that is gone;
-/// keep the vector. The lists are of one size.
+/// What matches two images' points, for homographies and fundamental matrices: view(pairs(first, second)) would look at memory that is
+/// gone; keep the vector. The lists are of one size.
 template <class Scalar>
 std::vector<cv::Vec<Scalar, 4>> pairs(const std::vector<cv::Point_<Scalar>>& first, const std::vector<cv::Point_<Scalar>>& second) {
   std::vector<cv::Vec<Scalar, 4>> all;
