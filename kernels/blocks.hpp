@@ -34,7 +34,4 @@ struct BlockBounds {
 /// Eigenvectors of a covariance of two or three dimensions, as the columns of `axes`; it becomes diagonal.
 void principal_axes(std::array<std::array<double, 3>, 3>& covariance, std::array<std::array<double, 3>, 3>& axes, int dimension);
 
-/// `columns` and `caps` start at the block and hold kBlockPoints values; `dimension` is 2 or 3.
-BlockBounds bound_block(const float* const* columns, const float* caps, int dimension);
-
 }  // namespace swarmfit::kernels

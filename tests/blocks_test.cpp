@@ -349,21 +349,29 @@ TEST(MortonOrder, LargeCloudsAreOrderedAsSmallOnesAre) {
   EXPECT_EQ(again, cells);
 }
 
-TEST(BlockBounds, HoldEveryPointWithACap) {
+/// Values of a block, on a cache line.
+struct alignas(64) BlockColumn {
+  std::array<float, kBlockPoints> values{};
+  float& operator[](std::size_t i) { return values[i]; }
+};
+
+void expect_every_point_with_a_cap_held(const cpu::CpuKernels& kernels) {
+  SCOPED_TRACE(kernels.name);
   for (const int dimension : {2, 3}) {
     for (unsigned seed = 0; seed < 20; ++seed) {
       std::mt19937 engine(seed);
       std::normal_distribution<float> normal;
-      std::vector<std::vector<float>> columns(3, std::vector<float>(kBlockPoints));
-      std::vector<float> caps(kBlockPoints);
+      std::array<BlockColumn, 3> columns;
+      BlockColumn caps;
       for (std::size_t i = 0; i < kBlockPoints; ++i) {
         for (int c = 0; c < dimension; ++c) columns[static_cast<std::size_t>(c)][i] = normal(engine) * (c == 0 ? 1.0F : 0.05F) + 2;
         columns[1][i] += columns[0][i];
         caps[i] = i % 3 == 0 ? 0.0F : 0.1F + 0.01F * static_cast<float>(i % 5);
       }
       columns[0][0] = 50;  // has no cap, and must not widen the box
-      const float* starts[] = {columns[0].data(), columns[1].data(), columns[2].data()};
-      const BlockBounds bounds = bound_block(starts, caps.data(), dimension);
+      const float* starts[] = {&columns[0][0], &columns[1][0], &columns[2][0]};
+      BlockBounds bounds;
+      kernels.bound_block(starts, &caps[0], dimension, bounds);
       EXPECT_EQ(bounds.count, static_cast<float>(kBlockPoints - (kBlockPoints + 2) / 3));
       EXPECT_FLOAT_EQ(bounds.least_cap, 0.1F);
       EXPECT_FLOAT_EQ(bounds.most_cap, 0.14F);
@@ -387,13 +395,21 @@ TEST(BlockBounds, HoldEveryPointWithACap) {
   }
 }
 
+TEST(BlockBounds, HoldEveryPointWithACap) {
+  for (const cpu::CpuKernels* kernels : cpu::available_kernels()) expect_every_point_with_a_cap_held(*kernels);
+}
+
 TEST(BlockBounds, WithoutCapsThereIsNothingToReach) {
-  const std::vector<float> zeros(kBlockPoints, 0.0F);
-  const float* starts[] = {zeros.data(), zeros.data(), zeros.data()};
-  const BlockBounds bounds = bound_block(starts, zeros.data(), 3);
-  EXPECT_EQ(bounds.count, 0);
-  EXPECT_LT(bounds.most_cap, 0);
-  EXPECT_EQ(bounds.cap_sum, 0);
+  BlockColumn zeros;
+  const float* starts[] = {&zeros[0], &zeros[0], &zeros[0]};
+  for (const cpu::CpuKernels* kernels : cpu::available_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    BlockBounds bounds;
+    kernels->bound_block(starts, &zeros[0], 3, bounds);
+    EXPECT_EQ(bounds.count, 0);
+    EXPECT_LT(bounds.most_cap, 0);
+    EXPECT_EQ(bounds.cap_sum, 0);
+  }
 }
 
 }  // namespace

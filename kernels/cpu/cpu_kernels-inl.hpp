@@ -466,6 +466,8 @@ void bound(ModelKind kind, Loss loss, const TileBounds& tile, const float* coeff
   });
 }
 
+#include "kernels/cpu/block_bounds.inl"
+
 template <class Model>
 HWY_INLINE void take_sides_of(const TileView& tile, const float* HWY_RESTRICT coefficients, TileBounds& bounds) {
   constexpr std::size_t D = Model::traits.dimension;
@@ -534,6 +536,7 @@ const CpuKernels& kernel_table() {
                                 add_units,
                                 settle_units,
                                 cap_units,
+                                bound_block,
                                 bound,
                                 take_sides,
                                 distances,

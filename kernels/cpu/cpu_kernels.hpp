@@ -107,6 +107,9 @@ struct CpuKernels {
   /// Quanta of each block of the tile for a model that explains none of its points; exact form only.
   void (*cap_units)(const Summing& summing, const TileView& tile, std::int32_t* units);
 
+  /// `columns` and `caps` start at the block, on a cache line, and hold kBlockPoints values; `dimension` is 2 or 3.
+  void (*bound_block)(const float* const* columns, const float* caps, int dimension, BlockBounds& bounds);
+
   /// Bounds of models of a bounded kind over a tile. slack[j] is what rounding may do to a distance of model j.
   void (*bound)(ModelKind kind, Loss loss, const TileBounds& tile, const float* coefficients, const float* slack, std::size_t models,
                 Open* open, PartialBound* bounds);

@@ -225,7 +225,7 @@ void PointStore::prepare_bounds(const CpuKernels& kernels, const Summing& summin
       if (block < view.blocks) {
         std::array<const float*, kMaxDimension> columns{};
         for (std::size_t c = 0; c < static_cast<std::size_t>(dimension_); ++c) columns[c] = view.columns[c] + block * kBlockPoints;
-        one = bound_block(columns.data(), view.caps + block * kBlockPoints, dimension_);
+        kernels.bound_block(columns.data(), view.caps + block * kBlockPoints, dimension_, one);
       }
       pack_bounds(one, block, bounds);
       bounds.cap_units[block] = 0;

@@ -15,8 +15,14 @@ constexpr std::size_t kMaxRuns = 128;
 constexpr std::size_t kManyRuns = 32;
 /// Points x models below which looking at the blocks first cannot pay for the extra passes.
 constexpr std::size_t kLeastWork = std::size_t{1} << 18;
-/// What a swarm is shared out in where it is pruned: groups enough to keep each thread busy, of models enough for register tiles.
-constexpr std::size_t kGroupsPerThread = 3, kLeastGroup = 8;
+/// What a swarm is shared out in where it is pruned. Each group goes through the points by itself, which a few models do not repay; but the
+/// same number a thread, and where groups stay fair two of them, so that one which has more to do than others keeps no thread waiting for
+/// long.
+constexpr std::size_t kGroupsPerThread = 2, kFairGroup = 32, kLeastGroup = 8;
+/// Lines and planes below which looking at the blocks first does not pay: it saves these half of their residuals, others nearly all.
+constexpr std::size_t kLeastFlat = 32;
+/// Share of the residuals above which it does not pay: those of lines and planes are cheap.
+constexpr double kPoorFlat = 0.7, kPoorRound = 0.8;
 
 struct Runs {
   explicit Runs(const PointStore& store) : points(store.costly()), tiles(store.costly_tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
@@ -80,12 +86,14 @@ std::uint64_t SwarmCosts::evaluate(PointStore& points, const CentredSwarm& swarm
     return points.costly() * swarm.count;
   }
   const std::uint64_t touched = evaluate_open(points, swarm, summing, costs);
-  pause_.note(static_cast<double>(touched) / (static_cast<double>(points.costly()) * static_cast<double>(swarm.count)));
+  const double share = static_cast<double>(touched) / (static_cast<double>(points.costly()) * static_cast<double>(swarm.count));
+  pause_.note(share, traits(swarm.kind).affine ? kPoorFlat : kPoorRound);
   return touched;
 }
 
 bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing) {
   if (!pruning_ || !traits(swarm.kind).bounded || summing.scale == 0 || points.costly() * swarm.count < kLeastWork) return false;
+  if (traits(swarm.kind).affine && swarm.count < kLeastFlat) return false;
   return pause_.now();
 }
 
@@ -159,7 +167,9 @@ void SwarmCosts::sum_values(const PointStore& points, const CentredSwarm& swarm,
 std::uint64_t SwarmCosts::evaluate_open(PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
   points.prepare_bounds(kernels_, summing);
   // Each model's blocks are looked at, and what must be touched of them is, by one thread from first to last.
-  const std::size_t wanted = kGroupsPerThread * workers();
+  const std::size_t share = swarm.count / workers(),
+                    each = workers() > 1 ? std::clamp(share / kFairGroup, std::size_t{1}, kGroupsPerThread) : 1;
+  const std::size_t wanted = each * workers();
   const std::size_t size = std::clamp((swarm.count + wanted - 1) / wanted, kLeastGroup, kGroupModels);
   const std::size_t groups = (swarm.count + size - 1) / size;
   touched_.assign(groups, 0);

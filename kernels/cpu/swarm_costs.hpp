@@ -75,7 +75,7 @@ class SwarmCosts {
 
   const CpuKernels& kernels_;
   bool pruning_;
-  PruningPause pause_{0.8};
+  PruningPause pause_;
   float least_ = std::numeric_limits<float>::infinity();  ///< cost of the model whose sides the bounds know
 
   /// One thread's in quanta, begun anew with each swarm. What another core wrote is slow to get at, so lanes are added up by the thread

@@ -29,7 +29,7 @@ class VulkanEvaluator final : public FitnessEvaluator {
         cloud_(device_, options.pruning && !options.own),
         commands_(device_, pipelines_),
         identity_{"vulkan", device_.traits().name},
-        pruning_(device_.traits().software ? kPoorInSoftware : kPoor) {}
+        poor_(device_.traits().software ? kPoorInSoftware : kPoor) {}
 
   /// Takes this model in place of those that are built in. Before anything else.
   Result<> adopt(std::shared_ptr<const OwnModel> own);
@@ -64,6 +64,7 @@ class VulkanEvaluator final : public FitnessEvaluator {
   Identity identity_;
   std::shared_ptr<const OwnModel> own_;
   PruningPause pruning_;
+  double poor_;  ///< share of the residuals above which pruning does not pay
   std::vector<char> finite_;  // a model of the swarm: whether its coefficients are finite
   int dimension_ = 0;
   Effort effort_;
@@ -149,7 +150,7 @@ void VulkanEvaluator::evaluate_slice(const SwarmView& swarm, Loss loss, std::spa
   } else if (pruned) {
     const std::uint64_t touched = std::min(all, commands_.pruned_costs(swarm.kind, model.coefficient_count, loss, costs));
     effort_.touched += touched;
-    pruning_.note(static_cast<double>(touched) / static_cast<double>(all));
+    pruning_.note(static_cast<double>(touched) / static_cast<double>(all), poor_);
   } else {
     commands_.costs(swarm.kind, model.coefficient_count, loss, costs);
     effort_.touched += all;
