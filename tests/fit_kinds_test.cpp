@@ -311,6 +311,32 @@ TEST(FitFundamental, TwoSearchesEndAlikeSideBySideAndOneAfterTheOther) {
   }
 }
 
+TEST(FitFundamental, EachModelOfTheResultWasToldOf) {
+  const Motions made = few_points(2, {60, 60, 60});
+  FitOptions options;
+  options.model = ModelType::fundamental;
+  options.backend = "cpu";
+  std::size_t joined = 0;
+  for (options.seed = 1; options.seed <= 8; ++options.seed) {
+    std::vector<double> told;
+    const auto on_model = [&](const Model& model) {
+      told.push_back(model.found_at_ms);
+      return Verdict::go_on;
+    };
+    const auto result = fit(PointsView(std::span<const double>(made.rows), 4), options, on_model);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+    for (const Model& model : result->models) {
+      EXPECT_EQ(std::count(told.begin(), told.end(), model.found_at_ms), 1) << "seed " << options.seed;
+      EXPECT_GT(model.found_at_ms, 0);
+      EXPECT_LE(model.found_at_ms, result->total_ms);
+      EXPECT_GT(model.cost, 0);
+      joined += model.iterations == 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(joined, 0U) << "else these scenes do not show what the joint end makes";
+}
+
 TEST(FitFundamental, WhoHasEnoughGetsNoneOfASecondSearch) {
   const Motions made = few_points(2, {60, 60, 60});
   FitOptions options;

@@ -137,7 +137,7 @@ MultiModel::Seeds MultiModel::seeds_from(const std::vector<Model>& warm_start) c
 Expected<> MultiModel::run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
                            std::span<const Known> known) {
   if (auto done = look_for_models(on_model, warm_start, result, known); !done) return done;
-  return conclude(result);
+  return conclude(on_model, result);
 }
 
 Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,

@@ -71,7 +71,8 @@ class MultiModel {
   Expected<> look_for_models(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
                              std::span<const Known> known = {});
   /// The end. `others` are what another search has come to, in the same frame; `effort` is that of its evaluator, where that is another.
-  Expected<> conclude(FitResult& result, std::span<const models::Placed> others = {}, const kernels::Effort& effort = {});
+  Expected<> conclude(const ModelCallback& on_model, FitResult& result, std::span<const models::Placed> others = {},
+                      const kernels::Effort& effort = {});
   /// Of the evaluator, in this search.
   kernels::Effort effort() const noexcept;
   /// Has the caller said that there are models enough?
@@ -153,7 +154,9 @@ class MultiModel {
   void tell_parameters(FitResult& result) const;
   /// Shares the points out among what swarms have found, and looks for more with an eye to all of them.
   Expected<> share_out();
-  Expected<> share_out(FitResult& result, std::span<const models::Placed> others);
+  Expected<> share_out(FitResult& result, std::span<const models::Placed> others, const ModelCallback& on_model);
+  /// What is known of a model that the joint end made, as accept() has it of one that a swarm found.
+  Expected<> tell_joined(std::size_t found, Model& model) const;
   Expected<> share_out_locally();
   Expected<> search_further(Labelling& labelling);
   /// Does one of the joint end's models pay for itself, beside no other?

@@ -30,9 +30,10 @@ std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float
 
 }  // namespace
 
-Expected<> MultiModel::conclude(FitResult& result, std::span<const models::Placed> others, const kernels::Effort& effort) {
+Expected<> MultiModel::conclude(const ModelCallback& on_model, FitResult& result, std::span<const models::Placed> others,
+                                const kernels::Effort& effort) {
   effort_beside_ = effort;
-  if (labelling_ != nullptr) return share_out(result, others);
+  if (labelling_ != nullptr) return share_out(result, others, on_model);
   if (ends_jointly()) {
     if (auto done = polish(); !done) return done;
     // With many points the polished models are where the joint refit would leave them.

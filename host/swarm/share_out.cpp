@@ -1,5 +1,6 @@
 // The joint end of correspondences: points are shared out among the models, and more models are looked for with an eye to all of them.
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <utility>
 
@@ -72,7 +73,23 @@ Expected<> MultiModel::share_out() {
   return regroup(*labelling_);
 }
 
-Expected<> MultiModel::share_out(FitResult& result, std::span<const models::Placed> others) {
+Expected<> MultiModel::tell_joined(std::size_t found, Model& model) const {
+  std::vector<float> distances(points_.size());
+  const auto evidence = weigh(ground_.of(*found_[found].space), found_[found].theta, {}, distances);
+  if (!evidence) return tl::unexpected(evidence.error());
+  double square = 0;
+  for (std::size_t i = 0; i < labels_.size(); ++i) {
+    if (labels_[i] != found + 1) continue;
+    ++model.inliers;
+    square += static_cast<double>(distances[i]) * static_cast<double>(distances[i]);
+  }
+  model.cost = evidence->cost;
+  model.rms = model.inliers > 0 ? std::sqrt(square / static_cast<double>(model.inliers)) : 0.0;
+  model.found_at_ms = elapsed_ms();
+  return {};
+}
+
+Expected<> MultiModel::share_out(FitResult& result, std::span<const models::Placed> others, const ModelCallback& on_model) {
   Labelling& labelling = *labelling_;
   std::vector<models::Position> rivals;
   for (const models::Placed& model : others) rivals.push_back(model.theta);
@@ -101,6 +118,11 @@ Expected<> MultiModel::share_out(FitResult& result, std::span<const models::Plac
   labels_.resize(points_.size());
   labelling.write(labels_);
   count_effort(result);
+  for (std::size_t m = 0; m < found_.size(); ++m) {
+    if (labelling.kept()[m] != Labelling::kJoined) continue;
+    if (auto done = tell_joined(m, result.models[m]); !done) return done;
+    if (on_model && !stopped_by_caller_) stopped_by_caller_ = on_model(result.models[m]) == Verdict::stop;
+  }
   return {};
 }
 

@@ -57,7 +57,7 @@ Expected<> search_twice(MultiModel& first, MultiModel& again, std::stop_source& 
   if (!looked) return looked;
   if (!looked_again) return looked_again;
   const std::span<const models::Placed> others = first.stopped_by_caller() ? std::span<const models::Placed>() : again.found();
-  return first.conclude(result, others, how == Together::on_one_evaluator ? kernels::Effort{} : again.effort());
+  return first.conclude(on_model, result, others, how == Together::on_one_evaluator ? kernels::Effort{} : again.effort());
 }
 
 }  // namespace swarmfit::swarm

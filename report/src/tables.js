@@ -73,7 +73,7 @@ export function lists({result, about}, select) {
   $('models').append(...result.models.map((m, k) => item(modelColour(k + 1), `${called(m.type)} ${k + 1}`, m.supporting ? 'carries things' : '',
     whole(m.inliers), m.inliers / most,
     [...parameters(m), ['standard deviations', deviations(m)], ['inliers', whole(m.inliers)], ['rms', short(m.rms, 3) + unit],
-      ['found', m.found_at_ms > 0 ? `after ${ms(m.found_at_ms)} ms, ${m.iterations} steps, ${whole(m.evaluations)} evaluations` : 'when points were shared out']],
+      ['found', `after ${ms(m.found_at_ms)} ms, ${m.iterations > 0 ? `${m.iterations} steps, ${whole(m.evaluations)} evaluations` : 'when points were shared out'}`]],
     () => select('model', k + 1))));
   if (about.kind === 'perceive') {
     $('sois-part').hidden = false;

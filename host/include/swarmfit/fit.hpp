@@ -75,7 +75,9 @@ struct FitOptions {
   SWARMFIT_API Expected<> validate() const;
 };
 
-/// Told of each model the moment it is found; `stop` ends the fit with what there is. Of a cloud that was thinned, inliers and cost are
+/// Told of each model the moment it is found; `stop` ends the fit with what there is. The end refines all of them together, and where
+/// points are shared out (homographies, fundamental matrices) it may replace, join and drop them: it tells of those it made, the result
+/// holds those that stay. Of a cloud that was thinned, inliers and cost are
 /// those of the thinned cloud scaled to the whole; the result has the exact ones. Called in the thread of the fit's caller, to whom what it
 /// throws comes back, and the fit ends.
 enum class Verdict { go_on, stop };

@@ -44,8 +44,8 @@ struct Model {
   double rms = 0;               ///< of its inliers' distances [data unit]
   Eigen::MatrixXd covariance;   ///< of `parameters`, parameter_count x parameter_count, from the inliers' residuals
   bool supporting = false;      ///< set by perception: horizontal, and of reasonable size
-  std::size_t iterations = 0;   ///< swarm steps spent on it
-  std::size_t evaluations = 0;  ///< particles scored for it
+  std::size_t iterations = 0;   ///< swarm steps spent on it; 0 where the joint end made it of what all swarms had come to
+  std::size_t evaluations = 0;  ///< particles scored for it; 0 there, and where it was found while the threshold was estimated
   double points_touched = 1;    ///< share of points x particles really computed, in [0, 1]
   double found_at_ms = 0;       ///< since the start of the fit
   std::uint64_t id = 0;         ///< set by perception where frames follow each other: 1, 2 ..., the same plane over frames
