@@ -288,15 +288,15 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   if (thin_rows) {
     found = moved(std::move(found), working.frame(), whole->frame());
     hidden = moved(std::move(hidden), working.frame(), whole->frame());
-    if (auto done = swarm::refit(ground, found, search->shares_points(), hidden); !done) return tl::unexpected(done.error());
+    if (auto done = swarm::refit(ground, found, search->problem().shares_points(!search->hidden().empty()), hidden); !done) return tl::unexpected(done.error());
   }
   if (settings.refine && options.preset == Preset::fast) {
     if (auto done = swarm::refine_along(ground, found, hidden); !done) return tl::unexpected(done.error());
   }
   result.labels = thin_rows ? std::vector<std::uint16_t>{} : search->labels();
   std::vector<float> corners;
-  for (const models::Placed& model : search->found()) corners.push_back(search->corner(*model.space));
-  if (!search->hidden_owns()) hidden.clear();
+  for (const models::Placed& model : search->found()) corners.push_back(search->problem().corner(*model.space));
+  if (!search->problem().hidden_owns()) hidden.clear();
   search.reset();  // of many points it holds much
   if (auto done = swarm::settle(ground, found, hidden, corners, result); !done) return tl::unexpected(done.error());
   if (auto thrown = state_->watch->take()) return tl::unexpected(std::move(*thrown));
