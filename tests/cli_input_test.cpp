@@ -144,6 +144,19 @@ TEST(CliInput, WhatIsPrintedGetsOutOrIsMissed) {
   EXPECT_EQ(run_shell(folder, "\"$0\" perceive c.xyz c.xyz 2> /dev/full").code, 0);
 }
 
+TEST(CliInput, AHyphenIsStandardOutputAlone) {
+  const TemporaryFolder folder;
+  folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n0.5 0.5 0\n1.5 0.5 0\n");
+  const auto json = run_shell(folder, "\"$0\" fit plane c.xyz --json -");
+  EXPECT_EQ(json.code, 0) << json.err;
+  EXPECT_EQ(json.out.front(), '{');
+  EXPECT_EQ(json.out.substr(json.out.size() - 2), "}\n");
+  const auto labels = run_shell(folder, "\"$0\" fit plane c.xyz --labels -");
+  EXPECT_EQ(labels.code, 0) << labels.err;
+  EXPECT_EQ(labels.out, "1\n1\n1\n1\n1\n1\n1\n");
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "-"));
+}
+
 TEST(CliInput, NoFileTakesThePlaceOfAStreamThatIsClosed) {
   const TemporaryFolder folder;
   folder.put("c.xyz", "0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n");

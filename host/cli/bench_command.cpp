@@ -185,7 +185,9 @@ Command add_bench(CLI::App& app) {
   sub->add_option("--threads", a->threads, "Threads of the CPU back end; 0: all")->type_name("N")->capture_default_str();
   sub->add_option("--seconds", a->seconds, "Least time a row is run for")->type_name("S")->capture_default_str();
   sub->add_option("--seed", a->seed, "Of the made-up points and particles")->type_name("N")->capture_default_str();
-  sub->add_option("--json", a->json, "The rows as JSON")->type_name("FILE");
+  sub->add_option("--json", a->json, "The rows as JSON; - for standard output, alone")
+      ->transform([a = a.get()](const std::string& file) { return file_or_stdout(file, a->quiet); })
+      ->type_name("FILE");
   sub->add_flag("--quiet", a->quiet, "No table, no progress");
   sub->footer(
       "Each row's costs are checked against the reference back end before it is timed.\n"

@@ -144,10 +144,21 @@ Expected<> FitFlags::apply(FitOptions& options) const {
   return options.validate();
 }
 
+std::string file_or_stdout(const std::string& file, bool& quiet) {
+  if (file != "-") return file;
+  quiet = true;  // a summary would be in the way
+  return "/dev/stdout";
+}
+
 void OutputFlags::add_to(CLI::App& app, const std::string& out_help) {
   const char* group = kGroup;
-  app.add_option("--json", json, "The result as JSON: models, their parameters and covariance, times")->type_name("FILE")->group(group);
-  app.add_option("--labels", labels, "Text, a whole number a line, a line a point: 0 none, k the k-th model")
+  const auto to_stdout = [this](const std::string& file) { return file_or_stdout(file, quiet); };
+  app.add_option("--json", json, "The result as JSON: models, their parameters and covariance, times; - for standard output, alone")
+      ->transform(to_stdout)
+      ->type_name("FILE")
+      ->group(group);
+  app.add_option("--labels", labels, "Text, a whole number a line, a line a point: 0 none, k the k-th model; - as for --json")
+      ->transform(to_stdout)
       ->type_name("FILE")
       ->group(group);
   app.add_option("--out", out, out_help)->type_name("DIR")->group(group);

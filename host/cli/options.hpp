@@ -36,6 +36,9 @@ struct FitFlags {
   Expected<> apply(FitOptions& options) const;
 };
 
+/// What is given as a file to write: "-" is standard output, where nothing else is to be said then.
+std::string file_or_stdout(const std::string& file, bool& quiet);
+
 /// Where results go.
 struct OutputFlags {
   static constexpr const char* kGroup = "Where results go";
