@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/models/working_points.hpp"
+#include "kernels/fitness_evaluator.hpp"
 
 namespace swarmfit::models {
 
@@ -14,8 +15,10 @@ namespace swarmfit::models {
 class Neighbours {
  public:
   Neighbours() = default;
-  /// `candidates`: input indices of finite points. `count`: neighbours a point, fewer where there are fewer candidates.
-  Neighbours(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count);
+  /// `candidates`: input indices of finite points. `count`: neighbours a point, fewer where there are fewer candidates. `workers`, here and
+  /// below, may be null: whose threads share the work.
+  Neighbours(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
+             kernels::FitnessEvaluator* workers = nullptr);
 
   bool empty() const noexcept { return nearest_.empty(); }
   std::size_t count() const noexcept { return count_; }
@@ -29,6 +32,6 @@ class Neighbours {
 
 /// Unit normals of points in space, one a candidate: of the plane through it and its neighbours; zero where those have no one plane.
 std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates,
-                                              const Neighbours& neighbours);
+                                              const Neighbours& neighbours, kernels::FitnessEvaluator* workers = nullptr);
 
 }  // namespace swarmfit::models

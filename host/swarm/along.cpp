@@ -88,8 +88,9 @@ Expected<> refine_along(const Ground& whole, std::vector<models::Placed>& found,
     Ground part{.evaluator = whole.evaluator, .space = *found[m].space, .points = whole.points, .tau = whole.tau, .part = &subset};
     if (!whole.allowed.empty()) subset.gather(whole.allowed, allowed);
     part.allow(allowed);
-    const models::Neighbours neighbours(whole.points, subset.index(), kNeighbours);
-    if (auto done = refine_on(part, models::estimate_normals(whole.points, subset.index(), neighbours), found[m]); !done) return done;
+    const models::Neighbours neighbours(whole.points, subset.index(), kNeighbours, &whole.evaluator);
+    const auto normals = models::estimate_normals(whole.points, subset.index(), neighbours, &whole.evaluator);
+    if (auto done = refine_on(part, normals, found[m]); !done) return done;
   }
   return {};
 }

@@ -163,7 +163,9 @@ Expected<> FitCall::look_closely() {
   spread_ = spread_of(options_.noise, working(), depth_);
   const std::size_t size = part_searched_ ? settings().search_points : kSampledFrom;
   const auto steadiness = part_searched_ ? std::span<const float>(spread_) : std::span<const float>();
-  part_ = swarm::look_closely(working(), keenest(kinds_), Random(options_.seed), size, &evaluator_, steadiness);
+  // Threads that were woken for this would be in the way of two searches.
+  kernels::FitnessEvaluator* const workers = settings().searches > 1 ? nullptr : &evaluator_;
+  part_ = swarm::look_closely(working(), keenest(kinds_), Random(options_.seed), size, workers, steadiness);
   return check_backend(evaluator_, kinds_, part_searched_ ? part_->points.index().size() : working().size());
 }
 

@@ -188,9 +188,9 @@ Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space
                                                           : draw_steady_part(points, random, kSearchedPart, size, spread);
   Part part{Subset(points, drawn, workers), {}};
   const bool correspondences = points.dimension() > 3;
-  if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours);
+  if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours, workers);
   if (space.agrees_by_normals()) {
-    const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, part.points.index(), part.neighbours);
+    const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, part.points.index(), part.neighbours, workers);
     std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
     for (std::size_t k = 0; k < known.size(); ++k) normals[part.points.index()[k]] = known[k];
     points.set_normals(std::move(normals));
