@@ -98,6 +98,26 @@ TEST_F(Moves, NoMoreModelsComeOfItThanWereAskedFor) {
   EXPECT_EQ(labelling_->models().size(), 1U);
 }
 
+TEST_F(Moves, WhereTimeIsUpWhatIsThereStays) {
+  show({{0, 20, 0, kEach}, {130, -20, 0, kEach}});
+  bool up = false;
+  labelling_->stop_when([&] { return up; });
+  ASSERT_TRUE(labelling_->start({{shifted(20, 0)}}));
+  const double before = labelling_->energy();
+  const auto labels_before = labels();
+  const std::vector<models::Position> other{shifted(-20, 0)};
+  up = true;
+  auto joined = labelling_->offer(other);
+  ASSERT_TRUE(joined);
+  EXPECT_FALSE(*joined);
+  EXPECT_EQ(labelling_->energy(), before);
+  EXPECT_EQ(labels(), labels_before);
+  up = false;
+  joined = labelling_->offer(other);
+  ASSERT_TRUE(joined);
+  EXPECT_TRUE(*joined);
+}
+
 TEST_F(Moves, OtherModelsTakeThePlaceWhereTheyEndLower) {
   show({{0, 3, 0, kEach}, {130, -3, 0, kEach}});
   ASSERT_TRUE(labelling_->start({{shifted(0, 0)}}));

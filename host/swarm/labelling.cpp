@@ -155,7 +155,7 @@ Expected<> Labelling::alternate(State& state, double hopeless) {
   for (int round = 0; round < kAlternations; ++round) {
     auto better = refit(state);
     if (!better) return tl::unexpected(better.error());
-    if (!*better || state.energy > hopeless) break;
+    if (!*better || state.energy > hopeless || enough_()) break;
   }
   return {};
 }
@@ -246,7 +246,7 @@ Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
   std::vector<double> gains(proposals.size(), std::numeric_limits<double>::infinity());
   weigh_gains(*distances, gains);
   bool any = false;
-  for (int failures = 0; failures < kFailures && !full();) {
+  for (int failures = 0; failures < kFailures && !full() && !enough_();) {
     const auto best = std::max_element(gains.begin(), gains.end());
     if (best == gains.end() || !(*best > kPromising * prices_.model)) break;
     const auto p = static_cast<std::size_t>(best - gains.begin());

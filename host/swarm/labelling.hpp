@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <utility>
@@ -36,6 +37,8 @@ class Labelling {
 
   /// No more models than that, from now on; 0: no bound.
   void bound(std::size_t most) noexcept { most_ = most; }
+  /// Asked between attempts to lower the energy: true where there is no time for more. What is there then is valid.
+  void stop_when(std::function<bool()> enough) { enough_ = std::move(enough); }
   /// Shares the points out among `models` and refits these.
   Expected<> start(std::span<const models::Position> models);
   /// Takes in those of the proposals that lower the energy; true if there were any.
@@ -116,6 +119,7 @@ class Labelling {
   State state_;
   std::vector<std::size_t> kept_;
   std::size_t most_ = 0;
+  std::function<bool()> enough_ = [] { return false; };
 };
 
 }  // namespace swarmfit::swarm

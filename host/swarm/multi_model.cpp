@@ -52,7 +52,9 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
   if (!ends_jointly() || !problem_.shares_out()) return {};
   if (auto done = polish_.refine(found_, hidden_); !done) return done;
   share_out_ = std::make_unique<ShareOut>(problem_, left_, pilot_, candidates_);
-  return share_out_->run(found_, search_.proposals());
+  if (auto done = share_out_->run(found_, search_.proposals()); !done) return done;
+  if (auto why = pilot_.interrupted()) result.stop_reason = std::move(*why);
+  return {};
 }
 
 Expected<> MultiModel::look_round_by_round(const Seeds& seeds, const ModelCallback& on_model, FitResult& result) {

@@ -20,7 +20,9 @@ ShareOut::ShareOut(const Problem& problem, Unexplained& left, Pilot& pilot, cons
       left_(left),
       pilot_(pilot),
       candidates_(candidates),
-      labelling_(problem.ground, problem.part, problem.neighbours, problem.settings.prices) {}
+      labelling_(problem.ground, problem.part, problem.neighbours, problem.settings.prices) {
+  labelling_.stop_when([&pilot] { return pilot.interrupted().has_value(); });
+}
 
 Expected<> ShareOut::run(std::span<const models::Placed> found, std::span<const models::Position> proposals) {
   labelling_.bound(pilot_.limits().max_models);
