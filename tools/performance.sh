@@ -49,7 +49,8 @@ if [ -z "$bin" ]; then
   cmake --build --preset release --target swarmfit_cli swarmfit_peers
   swarmfit=build/release/host/cli/swarmfit peers=build/release/bench/swarmfit_peers
 else
-  swarmfit=$(find "$bin" -name swarmfit -perm -u+x ! -type d -print -quit)
+  # Not what a test has installed below it.
+  swarmfit=$(find "$bin" -name swarmfit -perm -u+x ! -type d ! -path '*/install-test/*' -print -quit)
   peers=$(find "$bin" -name swarmfit_peers -perm -u+x ! -type d -print -quit)
 fi
 mkdir -p "$out"
