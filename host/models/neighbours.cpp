@@ -48,8 +48,8 @@ Eigen::Vector3f normal_of(const WorkingPoints& points, std::span<const std::uint
 /// body(first, last) for runs of `count` places.
 template <class Body>
 void for_runs(std::size_t count, kernels::FitnessEvaluator* workers, Body&& body) {
-  constexpr std::size_t kRun = 64;
-  if (workers == nullptr || count <= kRun) return body(std::size_t{0}, count);
+  constexpr std::size_t kRun = 64, kWorthWaking = 1024;
+  if (workers == nullptr || count <= kWorthWaking) return body(std::size_t{0}, count);
   workers->share_out((count + kRun - 1) / kRun, [&](std::size_t run) { body(run * kRun, std::min(count, (run + 1) * kRun)); });
 }
 
