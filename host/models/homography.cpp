@@ -65,7 +65,7 @@ class Homography final : public Linearised<Homography, Projective, 2, 9> {
     const Eigen::RowVector3d x = first(Eigen::Vector4d(row)).transpose();
     at.residual = error.residual;
     for (int i = 0; i < 2; ++i) {
-      for (int r = 0; r < 3; ++r) at.by_parameter.block<1, 3>(i, 3 * r) = error.by_row(r, i) * x;
+      for (Eigen::Index r = 0; r < 3; ++r) at.by_parameter.block<1, 3>(i, 3 * r) = error.by_row(r, i) * x;
     }
     return true;
   }

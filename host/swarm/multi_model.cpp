@@ -126,7 +126,7 @@ Expected<Outcome> MultiModel::search_each(const Seeds& seeds, Candidate& best) {
 }
 
 Expected<Outcome> MultiModel::search(const Seeds& seeds, Candidate& best) {
-  const auto reached = search_each(seeds, best);
+  auto reached = search_each(seeds, best);
   if (!reached || (*reached == Outcome::interrupted && pilot_.interrupted())) return reached;
   if (problem_.kinds.size() > 1 && *reached == Outcome::found) {
     Candidate rejected = best;
