@@ -266,6 +266,44 @@ void erase_models(FitResult& fit, std::vector<Surface>& surfaces, std::size_t le
   for (auto& label : fit.labels) label = number[label];
 }
 
+/// Those that are no clutter, upright; the others leave the result.
+std::vector<LocalPlane> keep_planes(const std::vector<bool>& clutter, const Eigen::Vector3d& up, FitResult& fit) {
+  std::vector<Model> models;
+  std::vector<LocalPlane> planes;
+  for (std::size_t k = 0; k < fit.models.size(); ++k) {
+    if (clutter[k]) continue;
+    if (fit.models[k].normal().dot(up) < 0) fit.models[k].parameters = -fit.models[k].parameters;
+    planes.push_back(to_local(fit.models[k]));
+    models.push_back(std::move(fit.models[k]));
+  }
+  fit.models = std::move(models);
+  return planes;
+}
+
+/// All of them, by cells whose direction is known.
+void refine_all_on_known(const Overview& overview, const std::vector<std::uint32_t>& flat, float tau, const Eigen::Vector3d& up,
+                         double most_angle, std::vector<LocalPlane>& planes, FitResult& fit) {
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    planes[k] = refine_on_known(overview, flat, planes[k], tau, up, most_angle);
+    fit.models[k].parameters << planes[k].normal.cast<double>(), static_cast<double>(planes[k].offset);
+  }
+}
+
+/// What each plane holds, once those that are one surface are joined.
+std::vector<Surface> surfaces_of(const Overview& overview, const std::vector<std::uint32_t>& flat, std::vector<LocalPlane> planes,
+                                 int threads, FitResult& fit) {
+  const auto tau = static_cast<float>(fit.threshold);
+  auto labels = label_cells(overview, flat, planes, tau);
+  if (overview.has_normals()) join_alike(overview, tau, labels, planes, fit.models);
+  std::vector<Surface> surfaces(planes.size());
+  common::in_parallel(static_cast<int>(planes.size()), 1, threads, [&](int first, int last) {
+    for (int k = first; k < last; ++k) {
+      surfaces[static_cast<std::size_t>(k)] = grow_surface(overview, labels, k + 1, planes[static_cast<std::size_t>(k)], tau);
+    }
+  });
+  return surfaces;
+}
+
 }  // namespace
 
 Expected<FitResult> find_any_planes(Fitter& fitter, const Overview& overview, const PlanesSuffice& suffice, const std::stop_token& stop) {
@@ -326,30 +364,10 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
   fit.finite_points = grid.finite;
   clutter.resize(fit.models.size(), true);  // the one that was too small
 
-  std::vector<Model> models;
-  std::vector<LocalPlane> planes;
-  for (std::size_t k = 0; k < fit.models.size(); ++k) {
-    if (clutter[k]) continue;
-    if (fit.models[k].normal().dot(up) < 0) fit.models[k].parameters = -fit.models[k].parameters;
-    planes.push_back(to_local(fit.models[k]));
-    models.push_back(std::move(fit.models[k]));
-  }
-  fit.models = std::move(models);
+  std::vector<LocalPlane> planes = keep_planes(clutter, up, fit);
   if (too_small) fit.stop_reason = "no plane of reasonable size is left";
-
-  if (overview.stereo())
-    for (std::size_t k = 0; k < planes.size(); ++k) {
-      planes[k] = refine_on_known(overview, flat, planes[k], static_cast<float>(tau), up, fitter.options().prior->max_angle);
-      fit.models[k].parameters << planes[k].normal.cast<double>(), static_cast<double>(planes[k].offset);
-    }
-  auto labels = label_cells(overview, flat, planes, static_cast<float>(fit.threshold));
-  if (overview.has_normals()) join_alike(overview, static_cast<float>(fit.threshold), labels, planes, fit.models);
-  std::vector<Surface> surfaces(planes.size());
-  common::in_parallel(static_cast<int>(planes.size()), 1, options.fit.threads, [&](int first, int last) {
-    for (int k = first; k < last; ++k)
-      surfaces[static_cast<std::size_t>(k)] =
-          grow_surface(overview, labels, k + 1, planes[static_cast<std::size_t>(k)], static_cast<float>(fit.threshold));
-  });
+  if (overview.stereo()) refine_all_on_known(overview, flat, static_cast<float>(tau), up, fitter.options().prior->max_angle, planes, fit);
+  std::vector<Surface> surfaces = surfaces_of(overview, flat, std::move(planes), options.fit.threads, fit);
   settle(grid, surfaces, options.fit.threads, fit);
   const auto seen = overview.stereo() ? flat_cells(overview) : flat;  // also what lies across
   for (std::size_t k = 0; k < surfaces.size(); ++k)
