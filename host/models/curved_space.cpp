@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kSteps = 6;             // of Gauss-Newton; starting points are good, and callers repeat
 constexpr int kHalvings = 4;          // of damping before a step is given up
-constexpr double kSettled = 1e-4;     // relative fall of the squares below which steps end: what is left falls quadratically
+constexpr double kSettled = 1e-4;     // relative fall of the squares below which steps end; callers reweight, or fit again
 constexpr double kLeastRank = 1e-12;  // of the information matrix: below, the points do not determine the model
 
 constexpr std::size_t kKept = std::size_t{1} << 16;  // points of a support that are kept: 2 MiB at most

@@ -69,6 +69,12 @@ class Homography final : public Linearised<Homography, Projective, 2, 9> {
     }
     return true;
   }
+  bool tell_residual(const double* row, const Position& theta, Linear& at) const {
+    Sampson error;
+    if (!sampson(row, theta, error)) return false;
+    at.residual = error.residual;
+    return true;
+  }
 
  protected:
   /// As for any kind, but that what a point adds to the information is a product of two matrices of three rows.
@@ -104,17 +110,6 @@ class Homography final : public Linearised<Homography, Projective, 2, 9> {
     const Basis chart = basis(theta);
     sum.information = chart.transpose() * information * chart;
     sum.gradient = chart.transpose() * Eigen::Map<const Vector9>(gradient.data());
-    return sum;
-  }
-
-  double squares(const SupportRows& support, const Position& theta) const override {
-    double sum = 0;
-    SupportRows::Room room;
-    for (std::size_t k = 0; k < support.size(); ++k) {
-      Sampson at;
-      if (!sampson(support.row(k, room), theta, at)) return std::numeric_limits<double>::infinity();
-      sum += support.weight(k) * at.residual.squaredNorm();
-    }
     return sum;
   }
 

@@ -92,9 +92,6 @@ Expected<models::WorkingPoints> survey(kernels::FitnessEvaluator& evaluator, con
   return models::WorkingPoints(points, std::move(looked_at));
 }
 
-/// The columns of a point.
-int columns(const FitOptions& options) { return options.own ? options.own->dimension : dimension(options.model); }
-
 }  // namespace
 
 Expected<> EvaluatorPair::make() {
@@ -136,9 +133,9 @@ Expected<FitResult> FitCall::run(const PointsView& points, const std::vector<Mod
 }
 
 Expected<> FitCall::take(const PointsView& points) {
-  if (points.dimension() != columns(options_)) {
+  if (points.dimension() != columns_of(options_)) {
     return fail(Error::Kind::bad_input, fmt::format("points have {} columns, must have {} to fit a {}", points.dimension(),
-                                                    columns(options_), kinds_.front().space->title()));
+                                                    columns_of(options_), kinds_.front().space->title()));
   }
   auto whole = survey(evaluator_, points);
   if (!whole) return tl::unexpected(whole.error());
@@ -163,9 +160,7 @@ Expected<> FitCall::look_closely() {
   spread_ = spread_of(options_.noise, working(), depth_);
   const std::size_t size = part_searched_ ? settings().search_points : kSampledFrom;
   const auto steadiness = part_searched_ ? std::span<const float>(spread_) : std::span<const float>();
-  // Threads that were woken for this would be in the way of two searches.
-  kernels::FitnessEvaluator* const workers = settings().searches > 1 ? nullptr : &evaluator_;
-  part_ = swarm::look_closely(working(), keenest(kinds_), Random(options_.seed), size, workers, steadiness);
+  part_ = swarm::look_closely(working(), keenest(kinds_), Random(options_.seed), size, &evaluator_, steadiness);
   return check_backend(evaluator_, kinds_, part_searched_ ? part_->points.index().size() : working().size());
 }
 

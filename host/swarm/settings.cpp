@@ -73,7 +73,7 @@ Expected<> check_own(const FitOptions& options) {
 }
 
 Expected<> check_noise(const FitOptions& options) {
-  const int columns = options.own ? options.own->dimension : dimension(options.model);
+  const int columns = swarm::columns_of(options);
   if (options.noise == Noise::none || columns == 3) return {};
   return fail(Error::Kind::invalid_option,
               fmt::format("noise is depth, must be none for {}: it is fitted to points of {} columns, and depth is the third of 3",
@@ -171,6 +171,8 @@ Settings for_kind(Settings s, ModelType type) {
 }
 
 }  // namespace
+
+int columns_of(const FitOptions& options) { return options.own ? options.own->dimension : dimension(options.model); }
 
 Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold) {
   Settings s = for_kind(preset(options.preset), options.model);

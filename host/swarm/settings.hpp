@@ -58,6 +58,9 @@ struct Settings {
 /// Points that minimal samples are drawn from where swarms search all of a large cloud: enough to tell surfaces apart.
 inline constexpr std::size_t kSampledFrom = 8192;
 
+/// Columns of a point that the options ask for.
+int columns_of(const FitOptions& options);
+
 /// `finite_points`: of the whole cloud; `threshold` in the data's unit. `min_inliers` counts points of the thinned cloud where it is
 /// thinned.
 Settings resolve(const FitOptions& options, std::size_t finite_points, double threshold);
