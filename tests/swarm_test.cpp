@@ -190,6 +190,37 @@ TEST_P(KnownLandscape, SwarmConvergesOnTheOptimum) {
   EXPECT_LT(space->distance(found, hidden), 0.01);
 }
 
+TEST(Swarm, TheFittestStartersFlyOn) {
+  const std::vector<double> rows = slab(200, 1.0);
+  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
+  const auto space = models::make_space(ModelType::plane, {});
+  Bowl bowl(plane(0.3, -0.2, 0.9, 0.05));
+  Settings settings;
+  settings.starters = 60;
+  settings.particles = 12;
+  const Random random(5);
+  const Subset subset(points, draw_part(points, random, kSearchedPart, 1000));
+  const models::Neighbours none;
+  const Sampler sampler(points, subset.index(), none, *space, random);
+  Landscape landscape(bowl, *space, points.frame(), settings);
+  Swarm swarm(*space, settings, random);
+  ASSERT_TRUE(swarm.start(sampler, 0, {}));
+  ASSERT_TRUE(swarm.step(landscape, sampler, 1.0));
+  ASSERT_EQ(swarm.fitness().size(), 60U);
+  ASSERT_EQ(swarm.positions().size(), 60U);
+  std::vector<double> best(swarm.fitness().begin(), swarm.fitness().end());
+  std::sort(best.begin(), best.end());
+  best.resize(12);
+  ASSERT_TRUE(swarm.step(landscape, sampler, 1.0));
+  ASSERT_EQ(swarm.fitness().size(), 12U);
+  ASSERT_EQ(swarm.own_bests().size(), 12U);
+  // Each is as good as it was, or better.
+  std::vector<double> now(swarm.own_fitness().begin(), swarm.own_fitness().end());
+  for (const double fitness : now) EXPECT_LE(fitness, best.back());
+  std::sort(now.begin(), now.end());
+  for (std::size_t k = 0; k < best.size(); ++k) EXPECT_LE(now[k], best[k]);
+}
+
 TEST(Payment, AFittedModelsEmptyRingSaysNothingAmongMany) {
   // As the joint end makes them of 400 strewn correspondences: 30 close by, nobody just beyond, some everywhere else.
   Settings settings;

@@ -36,8 +36,8 @@ Expected<Flight> fly(const PointsView& points, const FitOptions& options, int mo
   if (!swarm.start(sampler, 0, {})) return fail(Error::Kind::bad_input, "the points determine no model");
   for (int k = 0; k <= moves; ++k) {
     Step step;
-    for (const models::Position& theta : swarm.positions()) step.positions.push_back(space->to_data(theta, working.frame()));
     if (auto done = swarm.step(landscape, sampler, flight.nothing_explained); !done) return tl::unexpected(done.error());
+    for (const models::Position& theta : swarm.positions()) step.positions.push_back(space->to_data(theta, working.frame()));
     step.fitness.assign(swarm.fitness().begin(), swarm.fitness().end());
     step.best = space->to_data(swarm.best(), working.frame());
     step.best_fitness = swarm.best_fitness();

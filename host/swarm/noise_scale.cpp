@@ -165,7 +165,8 @@ class Estimate {
     for (Kind& kind : kinds_) {
       kind.settings.joint = false;  // what follows fits the models anew
       // Prominent models in closed form are hit by few samples.
-      if (!in_.options.particles && kind.space->closed_form()) kind.settings.particles /= 2;
+      if (in_.options.particles || !kind.space->closed_form()) continue;
+      (kind.settings.starters > 0 ? kind.settings.starters : kind.settings.particles) /= 2;
     }
     Limits limits;
     limits.max_models = models;

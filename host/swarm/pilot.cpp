@@ -106,12 +106,11 @@ Expected<> Pilot::watched_step(Swarm& swarm, std::size_t kind, const Sampler& sa
   step.type = problem_.space(kind).type();
   step.swarm = watch_->swarms;
   step.step = static_cast<std::size_t>(swarm.steps());
-  // Where particles are when they are scored: before they move on.
+  if (auto done = swarm.step(landscapes_[kind], sampler, scale_); !done) return done;
   const auto positions = swarm.positions();
   step.positions.resize(problem_.space(kind).parameter_count(), static_cast<Eigen::Index>(positions.size()));
   for (std::size_t j = 0; j < positions.size(); ++j)
     step.positions.col(static_cast<Eigen::Index>(j)) = problem_.space(kind).to_data(positions[j], problem_.points.frame());
-  if (auto done = swarm.step(landscapes_[kind], sampler, scale_); !done) return done;
   step.fitness.assign(swarm.fitness().begin(), swarm.fitness().end());
   step.best = problem_.space(kind).to_data(swarm.best(), problem_.points.frame());
   step.best_fitness = swarm.best_fitness();

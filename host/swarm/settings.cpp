@@ -149,12 +149,17 @@ Settings for_kind(Settings s, ModelType type) {
   // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
   if (type == ModelType::line2d || type == ModelType::circle2d) s.eager_stall = 1;
   if (type == ModelType::line2d) {
-    s.particles = 64;  // of two dimensions more of them find no more
+    s.starters = 64;  // of two dimensions more of them find no more
+    s.particles = 16;
     return s;
   }
   // Few minimal samples of a curved model hit one surface, and flight alone seldom finds another basin: particles start anew all along.
   s.renewal_share = 0.5;
   s.patience = 3;
+  if (type == ModelType::circle2d) {
+    s.starters = 256;
+    s.particles = 32;
+  }
   if (dimension(type) < 4) return s;
   // In eight dimensions flight settles slowly; and points of one surface or body lie together in both images.
   s.renewal_share = 0.75;
@@ -166,6 +171,8 @@ Settings for_kind(Settings s, ModelType type) {
   if (type == ModelType::fundamental) {
     s.searches = 2;
     s.stall = 7;
+    s.starters = 192;
+    s.particles = 32;
   }
   return s;
 }
@@ -181,13 +188,13 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
     s.search_points = 6144;
     s.fit_points = 12288;
   }
-  s.particles = options.particles.value_or(s.particles);
   s.iterations = options.iterations.value_or(s.iterations);
   // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
   // Such short swarms miss more, so one more of them may.
-  constexpr int kStallOnPart = 5, kFlatStallOnPart = 3, kPatienceOnPart = 3;
+  constexpr int kStallOnPart = 5, kFlatStallOnPart = 2, kPatienceOnPart = 3;
+  // Which of the planes is found is settled by where particles start; tools/plane_recall.py tells how many of them it takes.
+  constexpr int kFlatStarters = 256, kFlatOnPart = 32;
   // And refinement brings it the rest of the way: a hundredth of the saving is for that.
-  constexpr int kFlatOnPart = 64;
   constexpr double kStillOnPart = 0.01;
   const bool on_part = s.searches_part(finite_points);
   if (on_part) {
@@ -195,7 +202,14 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
     s.stall = flat ? kFlatStallOnPart : kStallOnPart;
     s.patience = kPatienceOnPart;
     s.still = kStillOnPart;
-    if (flat) s.particles = options.particles.value_or(kFlatOnPart);
+    if (flat) {
+      s.starters = kFlatStarters;
+      s.particles = kFlatOnPart;
+    }
+  }
+  if (options.particles) {
+    s.particles = *options.particles;
+    s.starters = 0;  // who asks for so many means all of them
   }
   if (options.stall) {
     s.stall = *options.stall;

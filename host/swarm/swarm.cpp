@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 namespace swarmfit::swarm {
 
@@ -26,12 +28,12 @@ std::size_t roulette(std::span<const double> fitness, double u) {
 
 Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random)
     : space_(space), settings_(settings), random_(random), chi_(constriction(settings.cognitive, settings.social)) {
-  const auto m = static_cast<std::size_t>(settings.particles);
-  positions_.resize(m);
+  const auto m = static_cast<std::size_t>(settings.particles), starters = static_cast<std::size_t>(settings.most_scored());
+  positions_.resize(starters);
+  own_best_.resize(starters);
+  fitness_.resize(starters);
+  own_fitness_.resize(starters);
   velocities_.resize(m);
-  own_best_.resize(m);
-  fitness_.resize(m);
-  own_fitness_.resize(m);
   if (space.free_normal() > 0 && settings.renewal_share == 0) together_.emplace(static_cast<std::size_t>(space.free_normal()), m);
 }
 
@@ -55,31 +57,53 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   for (std::size_t j = 1; j < m; ++j) {
     if (placed[j] == 0) positions_[j] = positions_[j - 1];
   }
-  const auto width = space_.parameter_count();
-  for (std::size_t j = 0; j < m; ++j) {
-    // A random velocity of the size of the swarm itself: part of the way to another particle.
-    const auto words = random_.words(Draw::move, round, 0, static_cast<std::uint32_t>(j));
-    velocities_[j].resize(width);
-    space_.difference(positions_[j], positions_[Random::below(words[0], m)], velocities_[j]);
-    velocities_[j] *= 0.5 * Random::unit(words[1]);
-  }
   std::fill(own_fitness_.begin(), own_fitness_.end(), std::numeric_limits<double>::infinity());
   return true;
 }
 
 Expected<> Swarm::step(Landscape& landscape, const Sampler& sampler, double scale) {
   scale_ = scale;
+  if (steps_ == 1) set_off();
+  if (steps_ > 0) move(sampler);
   if (auto done = landscape.fitness(positions_, own_fitness_, fitness_); !done) return done;
   ++steps_;
   remember();
-  move(sampler);
   return {};
+}
+
+void Swarm::set_off() {
+  const std::size_t starters = positions_.size(), m = velocities_.size();
+  std::vector<std::size_t> order(starters);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (starters > m) {
+    const auto last = order.begin() + static_cast<std::ptrdiff_t>(m);
+    std::nth_element(order.begin(), last, order.end(),
+                     [&](std::size_t a, std::size_t b) { return std::pair(fitness_[a], a) < std::pair(fitness_[b], b); });
+    order.resize(m);
+    std::sort(order.begin(), order.end());
+  }
+  for (std::size_t k = 0; k < m; ++k) {
+    // Part of the way to another starter.
+    const auto words = random_.words(Draw::move, round_, 0, static_cast<std::uint32_t>(order[k]));
+    velocities_[k].resize(space_.parameter_count());
+    space_.difference(positions_[order[k]], positions_[Random::below(words[0], starters)], velocities_[k]);
+    velocities_[k] *= 0.5 * Random::unit(words[1]);
+  }
+  const auto keep = [&](auto& of_each) {
+    for (std::size_t k = 0; k < m; ++k) of_each[k] = of_each[order[k]];
+    of_each.resize(m);
+  };
+  keep(positions_);
+  keep(own_best_);
+  keep(fitness_);
+  keep(own_fitness_);
 }
 
 void Swarm::remember() {
   std::size_t best = positions_.size();
   for (std::size_t j = 0; j < positions_.size(); ++j) {
-    if (fitness_[j] < own_fitness_[j]) {
+    // Infinite as it may be at first, a particle has a best for others to look at.
+    if (fitness_[j] < own_fitness_[j] || own_best_[j].size() == 0) {
       own_fitness_[j] = fitness_[j];
       own_best_[j] = positions_[j];
     }
@@ -141,10 +165,6 @@ void Swarm::put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask>
 }
 
 void Swarm::move(const Sampler& sampler) {
-  // A particle looks at its neighbours' bests, so none may change while others move.
-  for (std::size_t j = 0; j < positions_.size(); ++j) {
-    if (own_best_[j].size() == 0) own_best_[j] = positions_[j];
-  }
   if (together_) return fly_together();
   for_particles([&](std::size_t first, std::size_t last) {
     std::vector<Sampler::Ask> asks;

@@ -37,9 +37,9 @@ class Swarm {
   /// From now on particles are placed and moved side by side on the evaluator's threads, if these are awake anyway or a kind's samples take
   /// long. The same places come out.
   void share_work(kernels::FitnessEvaluator& evaluator);
-  /// New particles from minimal samples, the first of them from `seeds`. False if the data yield no sample at all.
+  /// Starters at minimal samples, the first of them at `seeds`. False if the data yield no sample at all.
   bool start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds);
-  /// Scores every particle, then moves it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
+  /// Moves every particle, but at first, and scores it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
   Expected<> step(Landscape& landscape, const Sampler& sampler, double scale);
 
   bool converged() const noexcept { return still_steps_ >= settings_.stall; }
@@ -50,6 +50,7 @@ class Swarm {
   double best_fitness() const noexcept { return list_.back().fitness; }
   /// The last n global bests, oldest first.
   const std::deque<GlobalBest>& global_bests() const noexcept { return list_; }
+  /// Where particles were scored last, and with what fitness.
   std::span<const models::Position> positions() const noexcept { return positions_; }
   std::span<const double> fitness() const noexcept { return fitness_; }
   std::span<const models::Position> own_bests() const noexcept { return own_best_; }
@@ -57,6 +58,9 @@ class Swarm {
 
  private:
   void remember();
+  /// Once the starters are scored: the fittest of them, in their order, get random velocities of the size of the swarm that they were. The
+  /// others are forgotten.
+  void set_off();
   void move(const Sampler& sampler);
   /// Is it a particle's turn to start anew from a sample?
   bool is_renewed(std::size_t particle) const noexcept;
