@@ -15,6 +15,8 @@ namespace {
 constexpr std::size_t kChunkRows = 16384;
 /// Points of a cloud whose memory counts for more than the time to ask for it anew.
 constexpr std::size_t kLarge = std::size_t{1} << 20;
+/// Blocks from which on their being small is worth the sort: of fewer, all are computed in no time.
+constexpr std::size_t kSortedBlocks = 9;
 /// Share of the points that may cost something from which on leaving out the others does not pay for the copy.
 constexpr double kMostCostly = 0.8;
 
@@ -77,7 +79,7 @@ void PointStore::assign(const PointsView& points) {
     for (std::size_t c = 0; c < kMaxDimension; ++c) centre_[c] += chunk.sum[c] / static_cast<double>(finite_ > 0 ? finite_ : 1);
   }
   keep_finite(points, chunks);
-  if (dimension_ <= 3 && all_.blocks > 1 && !points.ordered) sort();
+  if (dimension_ <= 3 && all_.blocks >= kSortedBlocks && !points.ordered) sort();
   all_.caps.assign(all_.blocks * kBlockPoints, 0.0F);  // after the sort, whose memory is free again
 }
 
