@@ -143,7 +143,13 @@ Settings preset(Preset preset) {
 
 /// What a kind asks of the search beyond the preset, where the preset is free to choose. Figures: docs/fitting.md.
 Settings for_kind(Settings s, ModelType type) {
-  if (!s.joint || type == ModelType::plane) return s;
+  if (!s.joint) return s;
+  // Where particles start settles what is found: many samples are scored once, and the fittest fly on.
+  if (type == ModelType::plane) {
+    s.starters = 512;
+    s.particles = 32;
+    return s;
+  }
   constexpr int kSoon = 5;  // still steps after which swarms of these kinds find no more
   if (type == ModelType::line2d || type == ModelType::circle2d || type == ModelType::homography) s.stall = kSoon;
   // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
@@ -192,8 +198,8 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.
   // Such short swarms miss more, so one more of them may.
   constexpr int kStallOnPart = 5, kFlatStallOnPart = 2, kPatienceOnPart = 3;
-  // Which of the planes is found is settled by where particles start; tools/plane_recall.py tells how many of them it takes.
-  constexpr int kFlatStarters = 256, kFlatOnPart = 32;
+  // Of a part fewer starters find as many planes, by tools/plane_recall.py.
+  constexpr int kFlatStarters = 256;
   // And refinement brings it the rest of the way: a hundredth of the saving is for that.
   constexpr double kStillOnPart = 0.01;
   const bool on_part = s.searches_part(finite_points);
@@ -202,10 +208,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
     s.stall = flat ? kFlatStallOnPart : kStallOnPart;
     s.patience = kPatienceOnPart;
     s.still = kStillOnPart;
-    if (flat) {
-      s.starters = kFlatStarters;
-      s.particles = kFlatOnPart;
-    }
+    if (flat) s.starters = kFlatStarters;
   }
   if (options.particles) {
     s.particles = *options.particles;
