@@ -165,6 +165,9 @@ Settings for_kind(Settings s, ModelType type) {
   if (type == ModelType::circle2d) {
     s.starters = 256;
     s.particles = 32;
+  } else if (type == ModelType::sphere || type == ModelType::cylinder) {
+    s.starters = 300;
+    s.particles = 75;
   }
   if (dimension(type) < 4) return s;
   // In eight dimensions flight settles slowly; and points of one surface or body lie together in both images.
