@@ -56,8 +56,7 @@ Expected<> fly(kernels::FitnessEvaluator& evaluator, const models::ModelSpace& s
   FitOptions options;
   options.model = space.type();
   swarm::Settings settings = swarm::resolve(options, working.finite_count(), kThreshold);
-  settings.particles = static_cast<int>(particles);
-  settings.starters = 0;
+  settings.starters = settings.particles = static_cast<int>(particles);
   const swarm::Random random(seed);
   const swarm::Part part = swarm::look_closely(working, space, random, swarm::kSampledFrom);
   const swarm::Sampler sampler(working, part.points.index(), part.neighbours, space, random);

@@ -74,7 +74,7 @@ const models::ModelSpace& keenest(std::span<const Kind> kinds) {
 
 Expected<> check_backend(const kernels::FitnessEvaluator& evaluator, std::span<const Kind> kinds, std::size_t points) {
   for (const Kind& kind : kinds) {
-    const kernels::Workload workload{kind.space->kind(), points, static_cast<std::size_t>(kind.settings.most_scored())};
+    const kernels::Workload workload{kind.space->kind(), points, static_cast<std::size_t>(kind.settings.starters)};
     if (const auto support = evaluator.supports(workload); !support) return fail(Error::Kind::backend_unavailable, support.reason);
   }
   return {};

@@ -166,7 +166,8 @@ class Estimate {
       kind.settings.joint = false;  // what follows fits the models anew
       // Prominent models in closed form are hit by few samples.
       if (in_.options.particles || !kind.space->closed_form()) continue;
-      (kind.settings.starters > 0 ? kind.settings.starters : kind.settings.particles) /= 2;
+      kind.settings.starters /= 2;
+      kind.settings.particles = std::min(kind.settings.particles, kind.settings.starters);
     }
     Limits limits;
     limits.max_models = models;

@@ -130,7 +130,6 @@ Settings preset(Preset preset) {
     s.patience = 1;
     return s;
   }
-  s.particles = 100;
   s.iterations = 100;
   s.stall = 10;
   s.topology = Topology::ring;
@@ -141,47 +140,50 @@ Settings preset(Preset preset) {
   return s;
 }
 
+/// How many samples are scored when a swarm of `fast` begins, and how many of them fly on. Which model is found is settled by where
+/// particles start, and many that are scored once cost no more than a few that fly. Figures: docs/fitting.md.
+struct Crowd {
+  int starters, particles;
+};
+
+Crowd crowd_of(ModelType type) {
+  switch (type) {
+    case ModelType::plane: return {512, 32};
+    case ModelType::line2d: return {64, 16};  // of two dimensions more of them find no more
+    case ModelType::circle2d: return {256, 32};
+    case ModelType::sphere:
+    case ModelType::cylinder: return {300, 75};
+    case ModelType::homography: return {64, 64};  // four points hit one surface often enough; what they miss the joint end makes out
+    case ModelType::fundamental: return {192, 32};
+    case ModelType::own: return {100, 100};
+  }
+  return {100, 100};
+}
+
 /// What a kind asks of the search beyond the preset, where the preset is free to choose. Figures: docs/fitting.md.
 Settings for_kind(Settings s, ModelType type) {
   if (!s.joint) return s;
-  // Where particles start settles what is found: many samples are scored once, and the fittest fly on.
-  if (type == ModelType::plane) {
-    s.starters = 512;
-    s.particles = 32;
-    return s;
-  }
+  const Crowd crowd = crowd_of(type);
+  s.starters = crowd.starters;
+  s.particles = crowd.particles;
+  if (type == ModelType::plane) return s;
   constexpr int kSoon = 5;  // still steps after which swarms of these kinds find no more
   if (type == ModelType::line2d || type == ModelType::circle2d || type == ModelType::homography) s.stall = kSoon;
   // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
   if (type == ModelType::line2d || type == ModelType::circle2d) s.eager_stall = 1;
-  if (type == ModelType::line2d) {
-    s.starters = 64;  // of two dimensions more of them find no more
-    s.particles = 16;
-    return s;
-  }
+  if (type == ModelType::line2d) return s;
   // Few minimal samples of a curved model hit one surface, and flight alone seldom finds another basin: particles start anew all along.
   s.renewal_share = 0.5;
   s.patience = 3;
-  if (type == ModelType::circle2d) {
-    s.starters = 256;
-    s.particles = 32;
-  } else if (type == ModelType::sphere || type == ModelType::cylinder) {
-    s.starters = 300;
-    s.particles = 75;
-  }
   if (dimension(type) < 4) return s;
   // In eight dimensions flight settles slowly; and points of one surface or body lie together in both images.
   s.renewal_share = 0.75;
   s.patience = 2;
   s.prices = type == ModelType::homography ? LabelPrices{0.15, 5.5} : LabelPrices{0.25, 5.5, 0.8};
-  // Four points hit one surface often enough; what they miss is made out by the joint end. Seven hit one body less often: two searches that
-  // end sooner find more than one that takes its time.
-  s.particles = 64;
+  // Seven points hit one body seldom: two searches that end sooner find more than one that takes its time.
   if (type == ModelType::fundamental) {
     s.searches = 2;
     s.stall = 7;
-    s.starters = 192;
-    s.particles = 32;
   }
   return s;
 }
@@ -214,8 +216,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
     if (flat) s.starters = kFlatStarters;
   }
   if (options.particles) {
-    s.particles = *options.particles;
-    s.starters = 0;  // who asks for so many means all of them
+    s.starters = s.particles = *options.particles;  // who asks for so many means all of them
   }
   if (options.stall) {
     s.stall = *options.stall;

@@ -21,8 +21,8 @@ enum class Topology {
 };
 
 struct Settings {
-  int particles = 100;
-  int starters = 0;  ///< minimal samples that a swarm begins with, of which the fittest fly on; 0: as many as there are particles
+  int starters = 100;   ///< minimal samples that a swarm begins with, no fewer than
+  int particles = 100;  ///< the fittest of them, which fly on
   int iterations = 200;
   int stall = 20;
   int eager_stall = 0;       ///< the same of the first swarms, until one of them finds nothing that pays; 0: all are alike
@@ -52,8 +52,6 @@ struct Settings {
   double threshold = 0.01;      ///< tau [data unit]
   std::size_t min_inliers = 0;  ///< resolved, >= 1
 
-  /// Models that one step scores at most.
-  int most_scored() const noexcept { return starters > particles ? starters : particles; }
   /// Do swarms search a part of so many points?
   bool searches_part(std::size_t finite_points) const noexcept { return search_points > 0 && finite_points > search_points; }
 };

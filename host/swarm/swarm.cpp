@@ -28,7 +28,7 @@ std::size_t roulette(std::span<const double> fitness, double u) {
 
 Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random)
     : space_(space), settings_(settings), random_(random), chi_(constriction(settings.cognitive, settings.social)) {
-  const auto m = static_cast<std::size_t>(settings.particles), starters = static_cast<std::size_t>(settings.most_scored());
+  const auto m = static_cast<std::size_t>(settings.particles), starters = static_cast<std::size_t>(settings.starters);
   positions_.resize(starters);
   own_best_.resize(starters);
   fitness_.resize(starters);
