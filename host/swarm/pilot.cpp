@@ -73,7 +73,7 @@ Background Pilot::background(std::size_t kind, std::span<const float> caps) cons
 }
 
 Expected<bool> Pilot::fly(Swarm& swarm, std::size_t kind, std::uint32_t round, std::span<const models::Position> seeds,
-                               std::span<const float> caps, float alive) {
+                          std::span<const float> caps, float alive) {
   // Normals bring neighbourhoods that are too close for a kind which has no use for them.
   const bool close = problem_.points.dimension() > 3 || problem_.space(kind).needs_normals();
   Sampler sampler(problem_.points, problem_.part.index(), close ? problem_.neighbours : none_, problem_.space(kind), problem_.random);

@@ -149,7 +149,7 @@ struct Crowd {
 Crowd crowd_of(ModelType type) {
   switch (type) {
     case ModelType::plane: return {512, 32};
-    case ModelType::line2d: return {64, 16};  // of two dimensions more of them find no more
+    case ModelType::line2d: return {256, 16};
     case ModelType::circle2d: return {256, 32};
     case ModelType::sphere:
     case ModelType::cylinder: return {300, 75};
@@ -171,7 +171,10 @@ Settings for_kind(Settings s, ModelType type) {
   if (type == ModelType::line2d || type == ModelType::circle2d || type == ModelType::homography) s.stall = kSoon;
   // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
   if (type == ModelType::line2d || type == ModelType::circle2d) s.eager_stall = 1;
-  if (type == ModelType::line2d) return s;
+  if (type == ModelType::line2d) {
+    s.eager_starters = 96;
+    return s;
+  }
   // Few minimal samples of a curved model hit one surface, and flight alone seldom finds another basin: particles start anew all along.
   s.renewal_share = 0.5;
   s.patience = 3;
@@ -217,6 +220,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   }
   if (options.particles) {
     s.starters = s.particles = *options.particles;  // who asks for so many means all of them
+    s.eager_starters = 0;
   }
   if (options.stall) {
     s.stall = *options.stall;

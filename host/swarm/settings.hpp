@@ -26,6 +26,7 @@ struct Settings {
   int iterations = 200;
   int stall = 20;
   int eager_stall = 0;       ///< the same of the first swarms, until one of them finds nothing that pays; 0: all are alike
+  int eager_starters = 0;    ///< theirs, where they end sooner; 0: as many as others have
   double inertia = 1.0;      ///< w of Eq. (1)
   double cognitive = 2.1;    ///< c1
   double social = 2.0;       ///< c2

@@ -28,12 +28,9 @@ std::size_t roulette(std::span<const double> fitness, double u) {
 
 Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random)
     : space_(space), settings_(settings), random_(random), chi_(constriction(settings.cognitive, settings.social)) {
-  const auto m = static_cast<std::size_t>(settings.particles), starters = static_cast<std::size_t>(settings.starters);
-  positions_.resize(starters);
-  own_best_.resize(starters);
-  fitness_.resize(starters);
-  own_fitness_.resize(starters);
+  const auto m = static_cast<std::size_t>(settings.particles);
   velocities_.resize(m);
+  positions_.resize(static_cast<std::size_t>(settings.starters));
   if (space.free_normal() > 0 && settings.renewal_share == 0) together_.emplace(static_cast<std::size_t>(space.free_normal()), m);
 }
 
@@ -42,7 +39,11 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   steps_ = 0;
   still_steps_ = 0;
   list_.clear();
-  const std::size_t m = positions_.size();
+  const auto m = static_cast<std::size_t>(settings_.starters);
+  positions_.resize(m);
+  fitness_.resize(m);
+  own_best_.assign(m, {});
+  own_fitness_.assign(m, std::numeric_limits<double>::infinity());
   const auto local = static_cast<std::size_t>(settings_.local_share * static_cast<double>(m));
   std::vector<std::uint8_t> placed(m, 1);
   const std::size_t seeded = std::min(seeds.size(), m);
@@ -57,7 +58,6 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   for (std::size_t j = 1; j < m; ++j) {
     if (placed[j] == 0) positions_[j] = positions_[j - 1];
   }
-  std::fill(own_fitness_.begin(), own_fitness_.end(), std::numeric_limits<double>::infinity());
   return true;
 }
 
