@@ -54,7 +54,7 @@ class Hypotheses {
 /// Looks for one plane until the budget is exhausted.
 using Search = std::function<void(Hypotheses&)>;
 
-/// Hypotheses scored together: as many as a swarm has particles.
+/// Hypotheses scored together.
 inline constexpr std::size_t kBatch = 100;
 
 std::unique_ptr<Contender> make_sampling_fit(std::string name, std::string how, Search search);

@@ -29,7 +29,7 @@ LINE_ROWS = [
     ("fast, s = 5", "all swarms alike", ["--stall", "5"]),
     ("fast, s = 10", "the default for planes", ["--stall", "10"]),
     ("fast, s = 20", "and later", ["--stall", "20"]),
-    ("fast, all samples fly, 64", "a swarm of as many as begin", ["--particles", "64"]),
+    ("fast, all samples fly, 64", "none is left out after the first step", ["--particles", "64"]),
     ("fast, all samples fly, 200", "", ["--particles", "200"]),
     ("fast, no flight", "random sampling, half of it local; the best refined", ["--particles", "1250", "--iterations", "1"]),
     ("fast, no flight, more", "the same with more samples", ["--particles", "2500", "--iterations", "1"]),

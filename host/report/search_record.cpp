@@ -13,15 +13,16 @@ constexpr std::size_t kMostSteps = 1500;     // of a search
 void SearchRecord::add(const SwarmStep& step) {
   particles_ = std::max(particles_, step.fitness.size());
   if (seen_++ % every_ != 0) return;
-  const Eigen::Index kept = std::min(kMostParticles, step.positions.cols());
-  steps_.push_back({step.type,
-                    step.swarm,
-                    step.step,
-                    step.positions.leftCols(kept),
-                    {step.fitness.begin(), step.fitness.begin() + kept},
-                    step.best,
-                    step.best_fitness,
-                    step.nothing_explained});
+  const Eigen::Index all = step.positions.cols(), kept = std::min(kMostParticles, all);
+  Step shown{step.type, step.swarm, step.step, Eigen::MatrixXd(step.positions.rows(), kept), {}, step.best, step.best_fitness,
+             step.nothing_explained};
+  for (Eigen::Index k = 0; k < kept; ++k) {
+    // Evenly, for the first half of the samples that a swarm begins with are local ones.
+    const Eigen::Index j = k * all / kept;
+    shown.positions.col(k) = step.positions.col(j);
+    shown.fitness.push_back(step.fitness[static_cast<std::size_t>(j)]);
+  }
+  steps_.push_back(std::move(shown));
   if (steps_.size() > kMostSteps) thin();
 }
 

@@ -154,7 +154,7 @@ Expected<bool> Polish::exchange_one(std::size_t kind, std::span<const std::uint3
     models.push_back(theta);
     points.push_back(point);
   }
-  const auto at_once = static_cast<std::size_t>(problem_.settings.particles);
+  const auto at_once = static_cast<std::size_t>(problem_.settings.starters);
   bool better = false;
   for (std::size_t first = 0; first < models.size(); first += at_once) {
     const auto some = std::span(models).subspan(first, std::min(at_once, models.size() - first));

@@ -21,8 +21,8 @@ enum class Topology {
 };
 
 struct Settings {
-  int starters = 100;   ///< minimal samples that a swarm begins with, no fewer than
-  int particles = 100;  ///< the fittest of them, which fly on
+  int starters = 100;   ///< minimal samples that a swarm begins with; no fewer than particles
+  int particles = 100;  ///< so many of them, the fittest, fly on
   int iterations = 200;
   int stall = 20;
   int eager_stall = 0;       ///< the same of the first swarms, until one of them finds nothing that pays; 0: all are alike

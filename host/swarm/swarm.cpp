@@ -30,7 +30,6 @@ Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Ra
     : space_(space), settings_(settings), random_(random), chi_(constriction(settings.cognitive, settings.social)) {
   const auto m = static_cast<std::size_t>(settings.particles);
   velocities_.resize(m);
-  positions_.resize(static_cast<std::size_t>(settings.starters));
   if (space.free_normal() > 0 && settings.renewal_share == 0) together_.emplace(static_cast<std::size_t>(space.free_normal()), m);
 }
 
@@ -39,7 +38,7 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   steps_ = 0;
   still_steps_ = 0;
   list_.clear();
-  const auto m = static_cast<std::size_t>(settings_.starters);
+  const auto m = static_cast<std::size_t>(std::max(settings_.starters, settings_.particles));
   positions_.resize(m);
   fitness_.resize(m);
   own_best_.assign(m, {});
@@ -143,17 +142,18 @@ const models::Position& Swarm::attractor(std::size_t particle) const {
   return own_best_[best];
 }
 
-void Swarm::share_work(kernels::FitnessEvaluator& evaluator) {
+kernels::FitnessEvaluator* Swarm::workers() const noexcept {
   const bool worth_waking = settings_.threads != 1 && space_.costly_samples();
-  workers_ = worth_waking || evaluator.shares(positions_.size()) ? &evaluator : nullptr;
+  return evaluator_ != nullptr && (worth_waking || evaluator_->shares(positions_.size())) ? evaluator_ : nullptr;
 }
 
 void Swarm::for_particles(const std::function<void(std::size_t, std::size_t)>& body) const {
   const std::size_t count = positions_.size(), samples = 2 * space_.samples_at_once();
-  const std::size_t at_once = workers_ == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 16;
+  kernels::FitnessEvaluator* const workers = this->workers();
+  const std::size_t at_once = workers == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 16;
   const auto some = [&](std::size_t k) { body(k * at_once, std::min(count, (k + 1) * at_once)); };
-  if (workers_ == nullptr) return some(0);
-  workers_->share_out((count + at_once - 1) / at_once, some);
+  if (workers == nullptr) return some(0);
+  workers->share_out((count + at_once - 1) / at_once, some);
 }
 
 void Swarm::put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask> asks, std::span<std::uint8_t> placed) {

@@ -34,12 +34,12 @@ class Swarm {
  public:
   Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random);
 
-  /// From now on particles are placed and moved side by side on the evaluator's threads, if these are awake anyway or a kind's samples take
-  /// long. The same places come out.
-  void share_work(kernels::FitnessEvaluator& evaluator);
+  /// From now on particles are placed and moved side by side on the evaluator's threads, where these are awake anyway for so many or a
+  /// kind's samples take long. The same places come out.
+  void share_work(kernels::FitnessEvaluator& evaluator) noexcept { evaluator_ = &evaluator; }
   /// Starters at minimal samples, the first of them at `seeds`. False if the data yield no sample at all.
   bool start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds);
-  /// Moves every particle, but at first, and scores it. `scale`: fitness of a model that explains nothing, by which stillness is judged.
+  /// Scores every particle; from the second step on it moves first. `scale`: fitness of a model that explains nothing, by which stillness is judged.
   Expected<> step(Landscape& landscape, const Sampler& sampler, double scale);
 
   bool converged() const noexcept { return still_steps_ >= settings_.stall; }
@@ -50,7 +50,7 @@ class Swarm {
   double best_fitness() const noexcept { return list_.back().fitness; }
   /// The last n global bests, oldest first.
   const std::deque<GlobalBest>& global_bests() const noexcept { return list_; }
-  /// Where particles were scored last, and with what fitness.
+  /// Where particles were scored last, or will be first, and with what fitness.
   std::span<const models::Position> positions() const noexcept { return positions_; }
   std::span<const double> fitness() const noexcept { return fitness_; }
   std::span<const models::Position> own_bests() const noexcept { return own_best_; }
@@ -71,6 +71,8 @@ class Swarm {
   std::array<std::uint32_t, 4> factors(std::size_t particle, std::size_t d) const;
   /// Puts particles at samples of their own: placed[k] is 0, and the k-th stays where it is, where the data yield none.
   void put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask> asks, std::span<std::uint8_t> placed);
+  /// Whose threads share the work on so many particles, or null.
+  kernels::FitnessEvaluator* workers() const noexcept;
   /// body(first, last) for runs of particles, side by side. What it does with one particle must not matter to another.
   void for_particles(const std::function<void(std::size_t, std::size_t)>& body) const;
   const models::Position& attractor(std::size_t particle) const;
@@ -79,7 +81,7 @@ class Swarm {
   const Settings& settings_;
   const Random& random_;
   double chi_;
-  kernels::FitnessEvaluator* workers_ = nullptr;
+  kernels::FitnessEvaluator* evaluator_ = nullptr;  // whose threads may share the work
   std::uint32_t round_ = 0;
   int steps_ = 0;
   int still_steps_ = 0;

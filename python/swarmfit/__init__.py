@@ -100,7 +100,8 @@ _FIT_OPTIONS = """
         threads: of the CPU back end; 0 takes all.
         seed: the same seed gives the same answer, on any number of threads.
         preset: "fast", what measures best; "paper", Zhou et al. 2010. Decides what is left to the default below.
-        particles, iterations, stall: size of the swarm; most steps of one; converged after so many steps without a better one.
+        particles, iterations, stall: size of the swarm, by default the fittest of many samples; most steps of one; converged after so many
+            steps without a better one.
         deflation: "residual" or "parametric". lambda_: strength of the latter.
         loss: "truncated_l1" or "truncated_l2".
         min_inliers: a model has at least so many points. max_models: stop after so many.

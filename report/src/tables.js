@@ -153,7 +153,7 @@ export function smallPrint({about, cloud, image, search}) {
   words.push('Positions are shown to 1/65536 of the cloud’s extent.');
   if (image?.every > 1) words.push(`The image is shown at 1/${image.every} of its size.`);
   const shown = Math.max(0, ...search.steps.map((s) => s.shares.length));
-  if (shown > 0 && shown < search.particles) words.push(`Of ${search.particles} particles ${shown} are shown.`);
+  if (shown > 0 && shown < search.particles) words.push(`Of a step ${shown} particles are shown, which may have up to ${search.particles}.`);
   if (search.every > 1) words.push(`Of the search every ${ordinal(search.every)} step is shown.`);
   words.push(`Written by swarmfit ${about.version}; drawn with three.js. The page is whole in itself and asks nothing of the network.`);
   $('small-print').textContent = words.join(' ');

@@ -54,7 +54,7 @@ struct FitOptions {
   Noise noise = Noise::none;        ///< depth: of 3 columns only; tau is for the near end, beyond three tenths of the points
                                     ///< it grows with the square of the depth
   Preset preset = Preset::fast;     ///< decides every option below that is left empty
-  std::optional<int> particles;     ///< M, in [2, 1000000]
+  std::optional<int> particles;     ///< M, in [2, 1000000]; all of them fly. None: the fittest of many samples
   std::optional<int> iterations;    ///< most steps of one swarm, >= 1
   std::optional<int> stall;         ///< s: converged when the global best has not moved for s steps, >= 1
   std::optional<Deflation> deflation;

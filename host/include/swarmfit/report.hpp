@@ -16,7 +16,7 @@
 
 namespace swarmfit {
 
-/// A search to be replayed, thinned while it grows so that a page can hold it: the first 64 particles of each step, and of a long search
+/// A search to be replayed, thinned while it grows so that a page can hold it: at most 64 particles of each step, and of a long search
 /// every second step, every fourth ...
 class SWARMFIT_API SearchRecord {
  public:
@@ -38,7 +38,7 @@ class SWARMFIT_API SearchRecord {
 
   const std::vector<Step>& steps() const noexcept { return steps_; }
   const std::vector<Found>& found() const noexcept { return found_; }
-  std::size_t particles() const noexcept { return particles_; }  ///< of the largest swarm, before thinning
+  std::size_t particles() const noexcept { return particles_; }  ///< of the largest step, before thinning
   std::size_t every() const noexcept { return every_; }          ///< one in so many steps was kept
 
  private:
