@@ -14,8 +14,8 @@ void SearchRecord::add(const SwarmStep& step) {
   particles_ = std::max(particles_, step.fitness.size());
   if (seen_++ % every_ != 0) return;
   const Eigen::Index all = step.positions.cols(), kept = std::min(kMostParticles, all);
-  Step shown{step.type, step.swarm, step.step, Eigen::MatrixXd(step.positions.rows(), kept), {}, step.best, step.best_fitness,
-             step.nothing_explained};
+  Step shown{step.type, step.swarm, step.step,         Eigen::MatrixXd(step.positions.rows(), kept),
+             {},        step.best,  step.best_fitness, step.nothing_explained};
   for (Eigen::Index k = 0; k < kept; ++k) {
     // Evenly, for the first half of the samples that a swarm begins with are local ones.
     const Eigen::Index j = k * all / kept;
