@@ -160,58 +160,58 @@ class Bowl final : public kernels::FitnessEvaluator {
   std::unique_ptr<models::ModelSpace> space_;
 };
 
+/// A swarm that starts on samples of a slab and flies over a bowl, which is asked in the data's frame.
+struct OverBowl {
+  OverBowl(const models::Position& hidden, const Settings& how, std::uint64_t seed) : bowl(hidden), settings(how), random(seed) {}
+
+  std::vector<double> rows = slab(200, 1.0);
+  models::WorkingPoints points{PointsView(std::span<const double>(rows), 3)};
+  std::unique_ptr<models::ModelSpace> space = models::make_space(ModelType::plane, {});
+  Bowl bowl;
+  Settings settings;
+  Random random;
+  Subset subset{points, draw_part(points, random, kSearchedPart, 1000)};
+  models::Neighbours none;
+  Sampler sampler{points, subset.index(), none, *space, random};
+  Landscape landscape{bowl, *space, points.frame(), settings};
+  Swarm swarm{*space, settings, random};
+};
+
 class KnownLandscape : public testing::TestWithParam<Topology> {};
 
 TEST_P(KnownLandscape, SwarmConvergesOnTheOptimum) {
-  const std::vector<double> rows = slab(200, 1.0);
-  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
-  const auto space = models::make_space(ModelType::plane, {});
-  // The bowl is asked in the data's frame.
   const models::Position hidden = plane(0.3, -0.2, 0.9, 0.05);
-  Bowl bowl(hidden);
   Settings settings;
   settings.topology = GetParam();
   settings.iterations = 400;
-  const Random random(11);
-  const Subset subset(points, draw_part(points, random, kSearchedPart, 1000));
-  const models::Neighbours none;
-  const Sampler sampler(points, subset.index(), none, *space, random);
-  Landscape landscape(bowl, *space, points.frame(), settings);
-  Swarm swarm(*space, settings, random);
-  ASSERT_TRUE(swarm.start(sampler, 0, {}));
+  OverBowl over(hidden, settings, 11);
+  Swarm& swarm = over.swarm;
+  ASSERT_TRUE(swarm.start(over.sampler, 0, {}));
   double last = INFINITY;
   while (!swarm.converged() && swarm.steps() < settings.iterations) {
-    ASSERT_TRUE(swarm.step(landscape, sampler, 1.0));
+    ASSERT_TRUE(swarm.step(over.landscape, over.sampler, 1.0));
     EXPECT_LE(swarm.best_fitness(), last) << "the global best never worsens";
     EXPECT_LE(swarm.global_bests().size(), static_cast<std::size_t>(settings.roulette_length));
     last = swarm.best_fitness();
   }
-  const models::Position found = space->to_data(swarm.best(), points.frame());
-  EXPECT_LT(space->distance(found, hidden), 0.01);
+  const models::Position found = over.space->to_data(swarm.best(), over.points.frame());
+  EXPECT_LT(over.space->distance(found, hidden), 0.01);
 }
 
 TEST(Swarm, TheFittestStartersFlyOn) {
-  const std::vector<double> rows = slab(200, 1.0);
-  const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));
-  const auto space = models::make_space(ModelType::plane, {});
-  Bowl bowl(plane(0.3, -0.2, 0.9, 0.05));
   Settings settings;
   settings.starters = 60;
   settings.particles = 12;
-  const Random random(5);
-  const Subset subset(points, draw_part(points, random, kSearchedPart, 1000));
-  const models::Neighbours none;
-  const Sampler sampler(points, subset.index(), none, *space, random);
-  Landscape landscape(bowl, *space, points.frame(), settings);
-  Swarm swarm(*space, settings, random);
-  ASSERT_TRUE(swarm.start(sampler, 0, {}));
-  ASSERT_TRUE(swarm.step(landscape, sampler, 1.0));
+  OverBowl over(plane(0.3, -0.2, 0.9, 0.05), settings, 5);
+  Swarm& swarm = over.swarm;
+  ASSERT_TRUE(swarm.start(over.sampler, 0, {}));
+  ASSERT_TRUE(swarm.step(over.landscape, over.sampler, 1.0));
   ASSERT_EQ(swarm.fitness().size(), 60U);
   ASSERT_EQ(swarm.positions().size(), 60U);
   std::vector<double> best(swarm.fitness().begin(), swarm.fitness().end());
   std::sort(best.begin(), best.end());
   best.resize(12);
-  ASSERT_TRUE(swarm.step(landscape, sampler, 1.0));
+  ASSERT_TRUE(swarm.step(over.landscape, over.sampler, 1.0));
   ASSERT_EQ(swarm.fitness().size(), 12U);
   ASSERT_EQ(swarm.own_bests().size(), 12U);
   // Each is as good as it was, or better.

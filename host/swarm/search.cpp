@@ -15,9 +15,7 @@ Expected<Outcome> Search::explore(std::uint32_t round, std::span<const models::P
   Settings settings = problem_.kinds[candidate.kind].settings;
   if (soon_ && settings.eager_stall > 0) {
     settings.stall = std::min(settings.stall, settings.eager_stall);
-    if (settings.eager_starters > 0) {
-      settings.starters = std::clamp(settings.eager_starters, settings.particles, std::max(settings.particles, settings.starters));
-    }
+    if (settings.eager_starters > 0) settings.starters = std::min(settings.starters, settings.eager_starters);
   }
   Swarm swarm(problem_.space(candidate.kind), settings, problem_.random);
   auto flown = pilot_.fly(swarm, candidate.kind, round, seeds, left_.caps(), kUnexplained * problem_.tau);

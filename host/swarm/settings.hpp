@@ -21,7 +21,7 @@ enum class Topology {
 };
 
 struct Settings {
-  int starters = 100;   ///< minimal samples that a swarm begins with; no fewer than particles
+  int starters = 100;   ///< minimal samples that a swarm begins with; as many as particles where it is less
   int particles = 100;  ///< so many of them, the fittest, fly on
   int iterations = 200;
   int stall = 20;

@@ -39,7 +39,8 @@ class Swarm {
   void share_work(kernels::FitnessEvaluator& evaluator) noexcept { evaluator_ = &evaluator; }
   /// Starters at minimal samples, the first of them at `seeds`. False if the data yield no sample at all.
   bool start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds);
-  /// Scores every particle; from the second step on it moves first. `scale`: fitness of a model that explains nothing, by which stillness is judged.
+  /// Scores every particle; from the second step on it moves first. `scale`: fitness of a model that explains nothing, by which stillness
+  /// is judged.
   Expected<> step(Landscape& landscape, const Sampler& sampler, double scale);
 
   bool converged() const noexcept { return still_steps_ >= settings_.stall; }
