@@ -7,7 +7,7 @@
 
 #include <swarmfit/batch.hpp>
 
-#include "host/bench/bench_case.hpp"
+#include "host/models/synthetic.hpp"
 #include "host/swarm/lock_step.hpp"
 
 namespace swarmfit {
@@ -20,7 +20,7 @@ struct Problems {
   std::vector<PointsView> views;
 
   explicit Problems(std::size_t count, ModelType type = ModelType::line2d) {
-    for (std::size_t k = 0; k < count; ++k) values.push_back(bench_internal::synthetic_points(type, kPoints, 100 + k));
+    for (std::size_t k = 0; k < count; ++k) values.push_back(models::synthetic_points(type, kPoints, 100 + k));
     for (const auto& rows : values) views.emplace_back(std::span<const float>(rows), dimension(type));
   }
 };
@@ -86,7 +86,7 @@ struct Awkward : Problems {
     views[5] = PointsView(std::span<const float>(), dimension(type));
     for (std::size_t i = 0; i < 20 * width; i += 3) values[11][i] = std::numeric_limits<float>::quiet_NaN();
     views[17] = PointsView(std::span<const float>(values[17]).first(40 * 4), 4);
-    values[23] = bench_internal::synthetic_points(type, 17000, 7);
+    values[23] = models::synthetic_points(type, 17000, 7);
     views[23] = PointsView(std::span<const float>(values[23]), dimension(type));
   }
 };

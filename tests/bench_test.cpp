@@ -11,6 +11,7 @@
 #include <swarmfit/points.hpp>
 
 #include "host/bench/bench_case.hpp"
+#include "host/models/synthetic.hpp"
 #include "kernels/machine_limit.hpp"
 
 namespace swarmfit {
@@ -108,7 +109,7 @@ TEST(Bench, RefusesACloudOfAnotherDimension) {
 }
 
 TEST(Bench, TakesTheCloudItIsGiven) {
-  const std::vector<float> values = bench_internal::synthetic_points(ModelType::plane, 777, 5);
+  const std::vector<float> values = models::synthetic_points(ModelType::plane, 777, 5);
   const PointsView cloud(std::span<const float>(values), 3);
   const auto report = bench(small(), &cloud);
   ASSERT_TRUE(report) << report.error().message;
@@ -123,7 +124,7 @@ TEST(Bench, TakesTheCloudItIsGiven) {
 }
 
 TEST(Bench, CountsFinitePointsAlone) {
-  std::vector<float> values = bench_internal::synthetic_points(ModelType::plane, 900, 5);
+  std::vector<float> values = models::synthetic_points(ModelType::plane, 900, 5);
   for (std::size_t i = 0; i < 300; ++i) values[9 * i + i % 3] = std::numeric_limits<float>::quiet_NaN();
   const PointsView cloud(std::span<const float>(values), 3);
   BenchOptions options = small();
@@ -137,7 +138,7 @@ TEST(Bench, CountsFinitePointsAlone) {
 }
 
 TEST(BenchCase, HoldsTheStepsOfASwarm) {
-  const std::vector<float> values = bench_internal::synthetic_points(ModelType::line2d, 1000, 3);
+  const std::vector<float> values = models::synthetic_points(ModelType::line2d, 1000, 3);
   const PointsView points(std::span<const float>(values), 2);
   const auto made = bench_internal::make_case(ModelType::line2d, points, 16, 3, 1);
   ASSERT_TRUE(made) << made.error().message;
@@ -155,8 +156,8 @@ TEST(BenchCase, HoldsTheStepsOfASwarm) {
 }
 
 TEST(BenchCase, SyntheticPointsFollowTheSeed) {
-  EXPECT_EQ(bench_internal::synthetic_points(ModelType::plane, 100, 1), bench_internal::synthetic_points(ModelType::plane, 100, 1));
-  EXPECT_NE(bench_internal::synthetic_points(ModelType::plane, 100, 1), bench_internal::synthetic_points(ModelType::plane, 100, 2));
+  EXPECT_EQ(models::synthetic_points(ModelType::plane, 100, 1), models::synthetic_points(ModelType::plane, 100, 1));
+  EXPECT_NE(models::synthetic_points(ModelType::plane, 100, 1), models::synthetic_points(ModelType::plane, 100, 2));
 }
 
 TEST(MachineLimit, RefusesWhatItCannotMeasure) {

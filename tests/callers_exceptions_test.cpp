@@ -11,8 +11,8 @@
 #include <swarmfit/fit.hpp>
 #include <swarmfit/perception.hpp>
 
-#include "host/bench/bench_case.hpp"
 #include "host/common/thrown.hpp"
+#include "host/models/synthetic.hpp"
 #include "tests/perception_fixture.hpp"
 
 namespace swarmfit {
@@ -36,11 +36,11 @@ std::optional<int> thrown_by(Call&& call) {
 
 Verdict refuse(const Model&) { throw Mine{7}; }
 void refuse_step(const SwarmStep& step) {
-  if (step.step == 3) throw Mine{8};
+  if (step.step == 1) throw Mine{8};
 }
 
 TEST(CallersExceptions, PassThroughAFit) {
-  const std::vector<float> values = bench_internal::synthetic_points(ModelType::plane, 20000, 3);
+  const std::vector<float> values = models::synthetic_points(ModelType::plane, 20000, 3);
   const PointsView points(std::span<const float>(values), 3);
   for (const int threads : {1, 2}) {
     FitOptions options;

@@ -12,7 +12,7 @@
 
 #include <swarmfit/fit.hpp>
 
-#include "host/bench/bench_case.hpp"
+#include "host/models/synthetic.hpp"
 
 namespace swarmfit {
 namespace {
@@ -33,7 +33,7 @@ class FitKinds : public testing::TestWithParam<ModelType> {
 
   /// Normals need neighbours close by.
   const std::size_t points_ = GetParam() == ModelType::cylinder ? 8000 : 1200;
-  const std::vector<float> values_ = bench_internal::synthetic_points(GetParam(), points_, 11);
+  const std::vector<float> values_ = models::synthetic_points(GetParam(), points_, 11);
 };
 
 TEST_P(FitKinds, EachTrueModelIsFoundAsOne) {
@@ -60,6 +60,39 @@ TEST_P(FitKinds, EachTrueModelIsFoundAsOne) {
     EXPECT_TRUE(model.parameters.allFinite());
     EXPECT_TRUE(model.covariance.allFinite());
     EXPECT_EQ(model.covariance.rows(), model.parameters.size());
+  }
+}
+
+TEST_P(FitKinds, SameAnswerWhetherPreparedOrNot) {
+  for (const bool estimated : {false, true}) {
+    FitOptions options;
+    options.model = GetParam();
+    options.threshold = 0.015;
+    options.estimate_threshold = estimated;
+    options.backend = "cpu";
+    options.particles = 70;
+    options.max_models = 2;
+    auto prepared = Fitter::create(options), plain = Fitter::create(options);
+    ASSERT_TRUE(prepared && plain);
+    std::size_t told = 0;
+    prepared->observe([&](const SwarmStep&) { ++told; });
+    prepared->prepare();
+    EXPECT_EQ(told, 0U) << "made-up points are nobody's business";
+    const PointsView points(std::span<const float>(values_), dimension(GetParam()));
+    const auto one = prepared->fit(points), other = plain->fit(points);
+    ASSERT_TRUE(one && other);
+    EXPECT_GT(told, 0U);
+    EXPECT_EQ(one->labels, other->labels);
+    EXPECT_EQ(one->evaluations, other->evaluations);
+    EXPECT_EQ(one->points_touched, other->points_touched);
+    EXPECT_EQ(one->iterations, other->iterations);
+    ASSERT_EQ(one->models.size(), other->models.size());
+    for (std::size_t m = 0; m < one->models.size(); ++m) {
+      EXPECT_EQ(one->models[m].parameters, other->models[m].parameters);
+      EXPECT_EQ(one->models[m].covariance, other->models[m].covariance);
+    }
+    EXPECT_EQ(prepared->options().particles, options.particles);
+    EXPECT_EQ(prepared->options().max_models, options.max_models);
   }
 }
 

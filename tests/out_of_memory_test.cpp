@@ -15,7 +15,7 @@
 
 #include <swarmfit/swarmfit.hpp>
 
-#include "host/bench/bench_case.hpp"
+#include "host/models/synthetic.hpp"
 #include "host/swarm/lock_step.hpp"
 #include "tests/failing_memory.hpp"
 #include "tests/io_files.hpp"
@@ -96,7 +96,7 @@ class FitOutOfMemory : public testing::TestWithParam<Case> {};
 
 TEST_P(FitOutOfMemory, IsAnErrorAndTheFitterGoesOn) {
   const Case& c = GetParam();
-  const std::vector<float> values = bench_internal::synthetic_points(c.type, c.points, 3);
+  const std::vector<float> values = models::synthetic_points(c.type, c.points, 3);
   const PointsView points(std::span<const float>(values), dimension(c.type));
   FitOptions options;
   options.model = c.type;
@@ -138,7 +138,7 @@ TEST(OwnModelOutOfMemory, IsAnErrorAlsoInItsOwnFunctions) {
     p[2] = -p[0] * q[0] - p[1] * q[1];
     return true;
   };
-  const std::vector<float> values = bench_internal::synthetic_points(ModelType::line2d, 100, 3);
+  const std::vector<float> values = models::synthetic_points(ModelType::line2d, 100, 3);
   const PointsView points(std::span<const float>(values), 2);
   FitOptions options;
   options.model = ModelType::own;
@@ -155,7 +155,7 @@ struct Clouds {
   std::vector<PointsView> views;
 
   explicit Clouds(std::size_t count) {
-    for (std::size_t k = 0; k < count; ++k) values.push_back(bench_internal::synthetic_points(ModelType::line2d, 120, 100 + k));
+    for (std::size_t k = 0; k < count; ++k) values.push_back(models::synthetic_points(ModelType::line2d, 120, 100 + k));
     for (const auto& rows : values) views.emplace_back(std::span<const float>(rows), 2);
   }
 };

@@ -14,6 +14,7 @@
 #include "host/bench/bench_case.hpp"
 #include "host/common/thrown.hpp"
 #include "host/models/model_space.hpp"
+#include "host/models/synthetic.hpp"
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/subset.hpp"
 #include "kernels/evaluators.hpp"
@@ -245,7 +246,7 @@ Expected<BenchReport> bench(const BenchOptions& options, const PointsView* cloud
       continue;
     }
     for (const std::size_t count : options.points) {
-      const std::vector<float> values = bench_internal::synthetic_points(type, count, options.seed);
+      const std::vector<float> values = models::synthetic_points(type, count, options.seed);
       const PointsView points(std::span<const float>(values), dimension(type));
       if (auto done = run_cloud(runner, options, type, points, backends); !done) return tl::unexpected(done.error());
     }

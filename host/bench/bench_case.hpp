@@ -13,12 +13,6 @@
 
 namespace swarmfit::bench_internal {
 
-/// Of each of the three uniform numbers whose sum is the noise of synthetic points.
-inline constexpr double kSyntheticSpread = 0.003;
-
-/// Synthetic points in [-1, 1]^D or thereabouts: six in ten near one of four models of the kind, the rest uniform.
-std::vector<float> synthetic_points(ModelType type, std::size_t count, std::uint64_t seed);
-
 /// One step of the swarm: its positions, and the personal bests that serve as cutoffs.
 struct Step {
   std::vector<double> parameters;

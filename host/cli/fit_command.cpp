@@ -147,7 +147,7 @@ int run(FitArguments& arguments, const CLI::App& app) {
     const Stopwatch starting;
     auto fitter = Fitter::create(*options);
     if (!fitter) return complain(fitter.error());
-
+    fitter->prepare();
     ready_ms = starting.ms();
     progress.say("reading " + arguments.input);
     const Stopwatch loading;

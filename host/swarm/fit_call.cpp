@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "host/models/model_space.hpp"
+#include "host/models/synthetic.hpp"
 #include "host/swarm/along.hpp"
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_model.hpp"
@@ -37,6 +38,27 @@ std::optional<double> default_threshold(const FitOptions& options) {
     case ModelType::fundamental: return kFundamental;
   }
   return std::nullopt;
+}
+
+bool estimates_threshold(const FitOptions& options) {
+  return options.estimate_threshold || !(options.threshold || default_threshold(options));
+}
+
+/// The same work on made-up points, in their unit, and as little of it as goes all the way.
+FitOptions rehearsal_of(const FitOptions& options) {
+  constexpr double kWellAbove = 5 * models::kSyntheticSpread;
+  constexpr int kFewSteps = 5, kFewParticles = 64;
+  FitOptions small = options;
+  small.estimate_threshold = estimates_threshold(options);
+  small.threshold = small.estimate_threshold ? std::nullopt : std::optional(kWellAbove);
+  small.noise = Noise::none;  // they have no depth
+  small.rivals.clear();       // a contest of kinds takes much longer than what it would save
+  small.prior.reset();
+  small.min_inliers = 0;
+  small.max_models = 0;
+  small.iterations = std::min(options.iterations.value_or(kFewSteps), kFewSteps);
+  if (options.particles) small.particles = std::min(*options.particles, kFewParticles);
+  return small;
 }
 
 Expected<> check_points(const PointsView& points, const models::WorkingPoints& working, const models::ModelSpace& space) {
@@ -116,6 +138,17 @@ FitCall::FitCall(const FitOptions& options, kernels::FitnessEvaluator& evaluator
       limits_(std::move(limits)),
       kinds_(make_kinds(options)) {}
 
+void FitCall::rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair) {
+  constexpr std::size_t kPoints = 32;
+  constexpr models::SyntheticMix kOneModel{1, 9};
+  const std::vector<float> values = models::synthetic_points(options.model, kPoints, options.seed, kOneModel);
+  if (values.empty()) return;
+  const FitOptions small = rehearsal_of(options);
+  const SwarmObserver nobody;
+  const ModelCallback untold;
+  static_cast<void>(FitCall(small, evaluator, pair, nobody, untold, Limits{}).run({values, dimension(options.model)}, {}));
+}
+
 Expected<FitResult> FitCall::run(const PointsView& points, const std::vector<Model>& warm_start) {
   if (auto done = take(points); !done) return tl::unexpected(done.error());
   if (auto done = look_closely(); !done) return tl::unexpected(done.error());
@@ -165,9 +198,8 @@ Expected<> FitCall::look_closely() {
 }
 
 Expected<> FitCall::settle_threshold(FitResult& result) {
-  const std::optional<double> given = options_.threshold ? options_.threshold : default_threshold(options_);
-  if (!options_.estimate_threshold && given) {
-    result.threshold = *given;
+  if (!estimates_threshold(options_)) {
+    result.threshold = options_.threshold ? *options_.threshold : *default_threshold(options_);
     return {};
   }
   auto estimated = estimate_threshold(evaluator_, working(), *part_, whole_.finite_count(), options_, watch(), spread_);

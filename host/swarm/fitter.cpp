@@ -94,6 +94,10 @@ BackendInfo Fitter::backend() const {
   return {who.backend, who.device, state_->reason};
 }
 
+void Fitter::prepare() noexcept try { swarm::FitCall::rehearse(state_->options, *state_->evaluator, state_->pair); } catch (...) {
+  // What is wrong will be wrong in fit() as well, which says so.
+}
+
 Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& on_model, std::stop_token stop,
                                 const std::vector<Model>& warm_start) try {
   swarm::Limits limits;

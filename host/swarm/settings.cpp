@@ -200,7 +200,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   if (s.joint && options.model == ModelType::plane && options.rivals.empty()) {
     // Planes have points enough to be seen among fewer; tools/plane_recall.py tells 16384 and these apart by no more than chance.
     s.search_points = 6144;
-    s.fit_points = 12288;
+    s.fit_points = 8192;
   }
   s.iterations = options.iterations.value_or(s.iterations);
   // What converged on a part of the cloud is refined on more of it: the swarm need not settle there.

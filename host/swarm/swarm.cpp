@@ -150,7 +150,7 @@ kernels::FitnessEvaluator* Swarm::workers() const noexcept {
 void Swarm::for_particles(const std::function<void(std::size_t, std::size_t)>& body) const {
   const std::size_t count = positions_.size(), samples = 2 * space_.samples_at_once();
   kernels::FitnessEvaluator* const workers = this->workers();
-  const std::size_t at_once = workers == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 16;
+  const std::size_t at_once = workers == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 32;
   const auto some = [&](std::size_t k) { body(k * at_once, std::min(count, (k + 1) * at_once)); };
   if (workers == nullptr) return some(0);
   workers->share_out((count + at_once - 1) / at_once, some);

@@ -79,7 +79,6 @@ struct Bench {
   std::size_t first = 0, count = 0;
   std::array<Piece, kStripWords> pieces;
   std::size_t piece_count = 0;
-  std::vector<std::size_t> claimants;  ///< models that some point was given to
 
   /// Strip number `index` of the points; those that are finite get `limit`, or their cap where there are any. False if none is finite.
   /// Words without a finite row are left out where the points tell of them.
@@ -342,6 +341,7 @@ void PointPasses::claim(const PointsView& points, std::span<const float> toleran
   const std::size_t runs = run_count(points);
   const std::span<const float> each = tolerance.size() > 1 ? tolerance : std::span<const float>();
   evidence_.assign(runs * models.size(), {});
+  claimed_.resize(runs * models.size());
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
     if (!bench.load(kernels_, points, strip, tolerance[0], each)) {
       std::fill_n(labels.begin() + static_cast<std::ptrdiff_t>(bench.first), bench.count, std::uint16_t{0});
@@ -350,22 +350,25 @@ void PointPasses::claim(const PointsView& points, std::span<const float> toleran
     alignas(64) std::array<float, kStripPoints> nearest, told;
     alignas(64) std::array<std::int32_t, kStripPoints> label;
     kernels_.begin_claim(bench.strip, nearest.data(), label.data());
-    bench.claimants.clear();
     const auto width = static_cast<std::size_t>(points.dimension);
     Evidence* const of_run = evidence_.data() + run * models.size();
+    std::uint8_t* const claimed = claimed_.data() + run * models.size();
     for (std::size_t m = 0; m < models.size(); ++m) {
       std::array<float, kMaxCoefficients> coefficients{};
+      claimed[m] = 0;
       if (!bench.centre(models[m], coefficients.data())) {
         of_run[m].cost += bench.be_nowhere(told);
         continue;
       }
-      const bool claimed = kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1),
-                                          nearest.data(), label.data(), of_run[m].cost);
-      if (claimed) bench.claimants.push_back(m);
+      claimed[m] = kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1), nearest.data(),
+                                  label.data(), of_run[m].cost)
+                       ? 1
+                       : 0;
     }
     bench.hand_back(std::uint16_t{0}, labels,
                     [&](std::size_t at, std::size_t count, std::uint16_t* to) { kernels_.end_claim(label.data() + at, count, to); });
-    for (const std::size_t m : bench.claimants) {
+    for (std::size_t m = 0; m < models.size(); ++m) {
+      if (claimed[m] == 0) continue;
       StripSums sums;
       kernels_.sum_labelled(bench.strip, width, static_cast<std::int32_t>(m + 1), nearest.data(), label.data(), sums);
       bench.add(sums, of_run[m]);

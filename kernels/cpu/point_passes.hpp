@@ -28,7 +28,8 @@ class PointPasses {
   void add_up(std::size_t runs, std::span<Evidence> evidence) const;
 
   const CpuKernels& kernels_;
-  std::vector<Evidence> evidence_;  ///< a run and a model
+  std::vector<Evidence> evidence_;     ///< a run and a model
+  std::vector<std::uint8_t> claimed_;  ///< the same: was any point of the strip at hand given to it?
 };
 
 }  // namespace swarmfit::kernels::cpu

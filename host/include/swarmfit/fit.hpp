@@ -110,6 +110,10 @@ class SWARMFIT_API Fitter {
   Fitter(Fitter&&) noexcept;
   Fitter& operator=(Fitter&&) noexcept;
 
+  /// Has the first fit take no longer than later ones: fits a few made-up points, a millisecond or some, so that code and memory have been
+  /// touched, threads started, a device's pipelines compiled. Results are the same with or without it. Does nothing for an own model.
+  void prepare() noexcept;
+
   /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension,
   /// a coordinate beyond 1e18, an own model's function that threw) or out_of_memory; what `on_model` throws comes back as it is.
   Expected<FitResult> fit(const PointsView& points, const ModelCallback& on_model = {}, std::stop_token stop = {},

@@ -1,16 +1,12 @@
-// Clouds to measure on: most points near a few models of the kind that is measured, the others anywhere.
-#include <array>
+#include "host/models/synthetic.hpp"
+
 #include <cmath>
 #include <random>
 
 #include <Eigen/Dense>
 
-#include "host/bench/bench_case.hpp"
-
-namespace swarmfit::bench_internal {
+namespace swarmfit::models {
 namespace {
-
-constexpr std::size_t kModels = 4;
 
 /// Uniform numbers in [-1, 1], the same on every standard library.
 class Numbers {
@@ -32,8 +28,8 @@ class Numbers {
 /// Moves a uniform point onto one of some planes or lines.
 class Flats {
  public:
-  Flats(int dimension, Numbers& number) {
-    for (std::size_t k = 0; k < kModels; ++k) normals_.push_back(number.direction(dimension));
+  Flats(int dimension, std::size_t count, Numbers& number) {
+    for (std::size_t k = 0; k < count; ++k) normals_.push_back(number.direction(dimension));
   }
   void place(std::size_t k, Numbers&, Eigen::VectorXd& x) const { x += (0.2 * static_cast<double>(k) - normals_[k].dot(x)) * normals_[k]; }
 
@@ -44,8 +40,8 @@ class Flats {
 /// Onto one of some circles, spheres or, where there is an axis, cylinders.
 class Rounds {
  public:
-  Rounds(int dimension, bool axes, Numbers& number) {
-    for (std::size_t k = 0; k < kModels; ++k) {
+  Rounds(int dimension, bool axes, std::size_t count, Numbers& number) {
+    for (std::size_t k = 0; k < count; ++k) {
       centres_.push_back(0.6 * number.direction(dimension));
       axes_.push_back(axes ? number.direction(dimension) : Eigen::VectorXd(Eigen::VectorXd::Zero(dimension)));
     }
@@ -62,11 +58,11 @@ class Rounds {
 /// The second view of a point: of a plane in space, or of a body that has moved and whose points lie at any depth.
 class Views {
  public:
-  Views(bool planes, Numbers& number) : planes_(planes) {
-    for (std::size_t k = 0; k < kModels; ++k) {
+  Views(bool planes, std::size_t count, Numbers& number) : planes_(planes) {
+    for (std::size_t k = 0; k < count; ++k) {
       const double angle = 0.2 * number();
-      turns_[k] = Eigen::AngleAxisd(angle, Eigen::Vector3d(number.direction(3))).toRotationMatrix();
-      shifts_[k] = 0.3 * Eigen::Vector3d(number.direction(3));
+      turns_.emplace_back(Eigen::AngleAxisd(angle, Eigen::Vector3d(number.direction(3))).toRotationMatrix());
+      shifts_.emplace_back(0.3 * Eigen::Vector3d(number.direction(3)));
     }
   }
   void place(std::size_t k, Numbers& number, Eigen::VectorXd& x) const {
@@ -78,19 +74,19 @@ class Views {
 
  private:
   bool planes_;
-  std::array<Eigen::Matrix3d, kModels> turns_;
-  std::array<Eigen::Vector3d, kModels> shifts_;
+  std::vector<Eigen::Matrix3d> turns_;
+  std::vector<Eigen::Vector3d> shifts_;
 };
 
 template <class Models>
-std::vector<float> cloud(const Models& models, int dimension, std::size_t count, Numbers& number) {
+std::vector<float> cloud(const Models& models, const SyntheticMix& mix, int dimension, std::size_t count, Numbers& number) {
   const auto width = static_cast<std::size_t>(dimension);
   std::vector<float> values(count * width);
   Eigen::VectorXd x(dimension);
   for (std::size_t i = 0; i < count; ++i) {
     for (double& v : x) v = number();
-    const bool on_model = i % 10 < 6;
-    if (on_model) models.place(i % kModels, number, x);
+    const bool on_model = i % 10 < mix.tenths;
+    if (on_model) models.place(i % mix.models, number, x);
     for (std::size_t c = 0; c < width; ++c) {
       values[i * width + c] = static_cast<float>(x[static_cast<Eigen::Index>(c)] + (on_model ? kSyntheticSpread * number.bell() : 0.0));
     }
@@ -100,20 +96,20 @@ std::vector<float> cloud(const Models& models, int dimension, std::size_t count,
 
 }  // namespace
 
-std::vector<float> synthetic_points(ModelType type, std::size_t count, std::uint64_t seed) {
+std::vector<float> synthetic_points(ModelType type, std::size_t count, std::uint64_t seed, const SyntheticMix& mix) {
   Numbers number(seed);
   const int columns = dimension(type);
   switch (type) {
     case ModelType::line2d:
-    case ModelType::plane: return cloud(Flats(columns, number), columns, count, number);
+    case ModelType::plane: return cloud(Flats(columns, mix.models, number), mix, columns, count, number);
     case ModelType::circle2d:
-    case ModelType::sphere: return cloud(Rounds(columns, false, number), columns, count, number);
-    case ModelType::cylinder: return cloud(Rounds(columns, true, number), columns, count, number);
-    case ModelType::own: return {};  // nobody here knows what it looks like
+    case ModelType::sphere: return cloud(Rounds(columns, false, mix.models, number), mix, columns, count, number);
+    case ModelType::cylinder: return cloud(Rounds(columns, true, mix.models, number), mix, columns, count, number);
+    case ModelType::own: return {};
     case ModelType::homography:
     case ModelType::fundamental: break;
   }
-  return cloud(Views(type == ModelType::homography, number), columns, count, number);
+  return cloud(Views(type == ModelType::homography, mix.models, number), mix, columns, count, number);
 }
 
-}  // namespace swarmfit::bench_internal
+}  // namespace swarmfit::models
