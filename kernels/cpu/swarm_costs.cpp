@@ -10,9 +10,12 @@
 namespace swarmfit::kernels::cpu {
 namespace {
 
-/// Runs of tiles; few, so that partial sums stay small whatever the size of the cloud.
+/// Runs of pieces of tiles; few, so that partial sums stay small whatever the size of the cloud.
 constexpr std::size_t kMaxRuns = 128;
-constexpr std::size_t kManyRuns = 32;
+/// Of a tile, at most; where whole ones would have all threads but one wait for longer than this share of the time.
+constexpr std::size_t kMostPieces = 4;
+constexpr double kWaiting = 0.01;
+static_assert(kTileBlocks % kMostPieces == 0);
 /// Points x models below which looking at the blocks first cannot pay for the extra passes.
 constexpr std::size_t kLeastWork = std::size_t{1} << 18;
 /// What a swarm is shared out in where it is pruned. Each group goes through the points by itself, which a few models do not repay; but the
@@ -24,33 +27,57 @@ constexpr std::size_t kLeastFlat = 32;
 /// Share of the residuals above which it does not pay: those of lines and planes are cheap.
 constexpr double kPoorFlat = 0.7, kPoorRound = 0.8;
 
+std::size_t groups_of(std::size_t models) { return (models + kGroupModels - 1) / kGroupModels; }
+
 struct Runs {
-  explicit Runs(const PointStore& store) : points(store.costly()), tiles(store.costly_tiles()), length((tiles + kMaxRuns - 1) / kMaxRuns) {
-    count = length == 0 ? 0 : (tiles + length - 1) / length;
+  /// Of whole tiles, whatever is evaluated.
+  explicit Runs(const PointStore& store) : Runs(store, std::size_t{1}) {}
+  /// Of pieces that make tasks of so many models which the threads can share evenly.
+  static Runs for_models(const PointStore& store, std::size_t models) {
+    std::size_t pieces = 1;
+    const auto waits = [&] {
+      const std::size_t tasks = store.costly_tiles() * pieces * groups_of(models), last = tasks % workers();
+      return last != 0 && static_cast<double>(workers() - last) > kWaiting * static_cast<double>(tasks);
+    };
+    while (pieces < kMostPieces && waits()) pieces *= 2;
+    return {store, pieces};
   }
+
   std::size_t first(std::size_t run) const { return run * length; }
-  std::size_t last(std::size_t run) const { return std::min(tiles, (run + 1) * length); }
-  std::size_t points, tiles, length, count;
+  std::size_t last(std::size_t run) const { return std::min(pieces, (run + 1) * length); }
+  TileView piece(const PointStore& store, std::size_t k) const {
+    TileView tile = store.costly_tile(k / of_tile);
+    const std::size_t most = kTileBlocks / of_tile, before = k % of_tile * most;
+    for (const float*& column : tile.columns) column += column != nullptr ? before * kBlockPoints : 0;
+    tile.caps += before * kBlockPoints;
+    tile.blocks = std::min(most, tile.blocks - std::min(before, tile.blocks));
+    return tile;
+  }
+  std::size_t points, of_tile, pieces, length, count;
+
+ private:
+  Runs(const PointStore& store, std::size_t pieces_of_tile)
+      : points(store.costly()),
+        of_tile(pieces_of_tile),
+        pieces(store.costly_tiles() * of_tile),
+        length((pieces + kMaxRuns - 1) / kMaxRuns),
+        count(length == 0 ? 0 : (pieces + length - 1) / length) {}
 };
 
 /// body(run, first model, models, member) for each run of tiles and group of models; then finish(member).
 template <class Body, class Finish>
 void for_tasks(const Runs& runs, std::size_t models, Body&& body, Finish&& finish) {
-  const std::size_t groups = (models + kGroupModels - 1) / kGroupModels;
+  const std::size_t groups = groups_of(models);
   // Alike in size, and whole register tiles but for the last group.
   constexpr std::size_t kMultiple = 8;
   static_assert(kGroupModels % kMultiple == 0);
   const std::size_t even = groups > 0 ? (models + groups - 1) / groups : 0, size = (even + kMultiple - 1) / kMultiple * kMultiple;
-  // Where there are runs enough for all threads, one thread takes all groups over a run while it is in its caches.
-  const std::size_t parts = runs.count < kManyRuns ? groups : 1;
+  // All groups over a run one after the other: it is in the caches then.
   const auto one = [&](std::size_t task, std::size_t member) {
-    const std::size_t part = task % parts;
-    for (std::size_t group = part; group < groups; group += parts) {
-      const std::size_t first = group * size;
-      body(task / parts, first, std::min(size, models - first), member);
-    }
+    const std::size_t first = task % groups * size;
+    body(task / groups, first, std::min(size, models - first), member);
   };
-  const std::size_t tasks = groups > 0 ? runs.count * parts : 0;
+  const std::size_t tasks = runs.count * groups;
   if (worth_sharing(runs.points, models)) {
     for_each_task_as_member(tasks, one, finish);
   } else {
@@ -109,7 +136,7 @@ void SwarmCosts::evaluate_all(const PointStore& points, const CentredSwarm& swar
 }
 
 void SwarmCosts::sum_units(const PointStore& points, const CentredSwarm& swarm, const Summing& summing, std::span<float> costs) {
-  const Runs runs(points);
+  const Runs runs = Runs::for_models(points, swarm.count);
   const std::size_t width = width_of(swarm.kind);
   units_.resize(std::max(units_.size(), workers()));
   ++swarm_;
@@ -125,8 +152,8 @@ void SwarmCosts::sum_units(const PointStore& points, const CentredSwarm& swarm, 
       own.units.assign(swarm.count, 0);
     }
     std::size_t& held = own.tiles[first];
-    for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.add_units(swarm.kind, summing, points.costly_tile(tile), swarm.coefficients.data() + first * width, models, nullptr,
+    for (std::size_t piece = runs.first(run); piece < runs.last(run); ++piece) {
+      kernels_.add_units(swarm.kind, summing, runs.piece(points, piece), swarm.coefficients.data() + first * width, models, nullptr,
                          own.lanes.data() + first * kMaxLanes);
       if (++held < kernels_.lanes) continue;
       settle(own, first, models);
