@@ -172,7 +172,7 @@ Settings for_kind(Settings s, ModelType type) {
   // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
   if (type == ModelType::line2d || type == ModelType::circle2d) s.eager_stall = 1;
   if (type == ModelType::line2d) {
-    s.eager_starters = 96;
+    s.eager_starters = 64;
     return s;
   }
   // Few minimal samples of a curved model hit one surface, and flight alone seldom finds another basin: particles start anew all along.
