@@ -5,12 +5,14 @@
 #include <limits>
 #include <utility>
 
+#include "host/swarm/kinds.hpp"
 #include "host/swarm/split.hpp"
 
 namespace swarmfit::swarm {
 namespace {
 
 constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
+constexpr int kCurvedRounds = 4;  // of refinement on a part: each goes to the end of Gauss and Newton, and all points have one yet
 
 }  // namespace
 
@@ -33,8 +35,8 @@ Expected<> Candidates::refine(Candidate& candidate) const {
   models::Position& theta = candidate.theta;
   if (problem_.part_searched && problem_.settings.refine) {
     const Ground part = problem_.part_ground.of(problem_.space(candidate.kind));
-    if (auto done = refine_one(part, problem_.settings.loss, left_.part_caps(), theta, kMostRounds); !done)
-      return tl::unexpected(done.error());
+    const int rounds = is_curved(part.space.type()) ? kCurvedRounds : kMostRounds;
+    if (auto done = refine_one(part, problem_.settings.loss, left_.part_caps(), theta, rounds); !done) return tl::unexpected(done.error());
   }
   return look(candidate, problem_.settings.refine ? problem_.full_rounds() : 0);
 }
