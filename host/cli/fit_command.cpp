@@ -147,7 +147,8 @@ int run(FitArguments& arguments, const CLI::App& app) {
     const Stopwatch starting;
     auto fitter = Fitter::create(*options);
     if (!fitter) return complain(fitter.error());
-    fitter->prepare();
+    // A device would compile pipelines for few points as well as for those that come.
+    if (fitter->backend().name == "cpu") fitter->prepare();
     ready_ms = starting.ms();
     progress.say("reading " + arguments.input);
     const Stopwatch loading;
