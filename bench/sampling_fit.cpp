@@ -13,7 +13,7 @@
 namespace swarmfit::peers {
 namespace {
 
-constexpr std::size_t kSearchPoints = 8192;  // what Swarmfit's own search looks at
+constexpr std::size_t kSearchPoints = 8192;  // no fewer than Swarmfit's own search looks at
 constexpr int kRefinements = 3;
 constexpr int kPatience = 2;
 constexpr float kDeadZone = 2;  // in thresholds: what a plane explains reaches so far, or its noise is found again

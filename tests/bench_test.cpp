@@ -155,11 +155,6 @@ TEST(BenchCase, HoldsTheStepsOfASwarm) {
   EXPECT_LE(best(made->steps.back().cutoffs), best(made->steps.front().reference) * (1 + 1e-5F));
 }
 
-TEST(BenchCase, SyntheticPointsFollowTheSeed) {
-  EXPECT_EQ(models::synthetic_points(ModelType::plane, 100, 1), models::synthetic_points(ModelType::plane, 100, 1));
-  EXPECT_NE(models::synthetic_points(ModelType::plane, 100, 1), models::synthetic_points(ModelType::plane, 100, 2));
-}
-
 TEST(MachineLimit, RefusesWhatItCannotMeasure) {
   EXPECT_FALSE(kernels::measure_machine_limit(-1, 0.01));
   EXPECT_FALSE(kernels::measure_machine_limit(1, 0));

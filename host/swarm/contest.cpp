@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t kFirstContest = 1U << 31;  // rounds of contests, apart from those of the search
 constexpr int kBriefStall = 1;                     // still steps that end a swarm on one model's points
-constexpr int kCurvedRounds = 1;                   // of refinement on these: who challenges with what comes of it is refined once more
+constexpr int kChallengerRounds = 1;               // of its refinement on these: before it is compared it is refined as any candidate
 constexpr double kGathered = 0.65;                 // share of a curved model's points that must gather about it
 constexpr double kWellGathered = 0.8;              // the same: above, it is not asked against as many faces as a box has
 constexpr double kAsGood = 0.95;                   // times what the faces of a box save: such a cylinder must save more
@@ -63,7 +63,7 @@ Expected<bool> Contest::best_on(std::size_t kind, std::span<const float> caps, m
   auto flown = pilot_.fly(swarm, kind, kFirstContest + contests_++, {}, caps, kUnexplained * problem_.tau);
   if (flown && *flown) {
     theta = swarm.best();
-    const int rounds = is_curved(problem_.space(kind).type()) ? kCurvedRounds : kMostRounds;
+    const int rounds = is_curved(problem_.space(kind).type()) ? kChallengerRounds : kMostRounds;
     if (auto done = refine_one(problem_.whole(kind), problem_.settings.loss, caps, theta, rounds, &distances); !done) {
       return tl::unexpected(done.error());
     }

@@ -40,8 +40,10 @@ std::optional<double> default_threshold(const FitOptions& options) {
   return std::nullopt;
 }
 
-bool estimates_threshold(const FitOptions& options) {
-  return options.estimate_threshold || !(options.threshold || default_threshold(options));
+/// Given, or the kind's default; none where it is to be estimated.
+std::optional<double> fixed_threshold(const FitOptions& options) {
+  if (options.estimate_threshold) return std::nullopt;
+  return options.threshold ? options.threshold : default_threshold(options);
 }
 
 /// The same work on made-up points, in their unit, and as little of it as goes all the way.
@@ -49,13 +51,12 @@ FitOptions rehearsal_of(const FitOptions& options) {
   constexpr double kWellAbove = 5 * models::kSyntheticSpread;
   constexpr int kFewSteps = 5, kFewParticles = 64;
   FitOptions small = options;
-  small.estimate_threshold = estimates_threshold(options);
+  small.estimate_threshold = !fixed_threshold(options);
   small.threshold = small.estimate_threshold ? std::nullopt : std::optional(kWellAbove);
   small.noise = Noise::none;  // they have no depth
-  small.rivals.clear();       // a contest of kinds takes much longer than what it would save
+  small.rivals.clear();       // a contest of all kinds takes longer than what it would save
   small.prior.reset();
   small.min_inliers = 0;
-  small.max_models = 0;
   small.iterations = std::min(options.iterations.value_or(kFewSteps), kFewSteps);
   if (options.particles) small.particles = std::min(*options.particles, kFewParticles);
   return small;
@@ -138,15 +139,19 @@ FitCall::FitCall(const FitOptions& options, kernels::FitnessEvaluator& evaluator
       limits_(std::move(limits)),
       kinds_(make_kinds(options)) {}
 
-void FitCall::rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair) {
-  constexpr std::size_t kPoints = 32;
+Expected<std::size_t> FitCall::rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair) {
+  constexpr std::size_t kPoints = 64;
   constexpr models::SyntheticMix kOneModel{1, 9};
   const std::vector<float> values = models::synthetic_points(options.model, kPoints, options.seed, kOneModel);
-  if (values.empty()) return;
+  if (values.empty()) return std::size_t{0};
   const FitOptions small = rehearsal_of(options);
   const SwarmObserver nobody;
   const ModelCallback untold;
-  static_cast<void>(FitCall(small, evaluator, pair, nobody, untold, Limits{}).run({values, dimension(options.model)}, {}));
+  Limits limits;
+  limits.max_models = 1;
+  const auto result = FitCall(small, evaluator, pair, nobody, untold, limits).run({values, dimension(options.model)}, {});
+  if (!result) return tl::unexpected(result.error());
+  return result->models.size();
 }
 
 Expected<FitResult> FitCall::run(const PointsView& points, const std::vector<Model>& warm_start) {
@@ -198,8 +203,8 @@ Expected<> FitCall::look_closely() {
 }
 
 Expected<> FitCall::settle_threshold(FitResult& result) {
-  if (!estimates_threshold(options_)) {
-    result.threshold = options_.threshold ? *options_.threshold : *default_threshold(options_);
+  if (const auto fixed = fixed_threshold(options_)) {
+    result.threshold = *fixed;
     return {};
   }
   auto estimated = estimate_threshold(evaluator_, working(), *part_, whole_.finite_count(), options_, watch(), spread_);

@@ -94,7 +94,9 @@ BackendInfo Fitter::backend() const {
   return {who.backend, who.device, state_->reason};
 }
 
-void Fitter::prepare() noexcept try { swarm::FitCall::rehearse(state_->options, *state_->evaluator, state_->pair); } catch (...) {
+void Fitter::prepare() noexcept try {
+  static_cast<void>(swarm::FitCall::rehearse(state_->options, *state_->evaluator, state_->pair));
+} catch (...) {
   // What is wrong will be wrong in fit() as well, which says so.
 }
 

@@ -63,6 +63,7 @@ class PointStore {
   TileView tile(std::size_t index) const noexcept { return all_.tile(dimension_, index); }
   /// Points that may cost something: without those whose cap is 0, where these are many.
   std::size_t costly() const noexcept { return scored().points; }
+  std::size_t costly_blocks() const noexcept { return scored().blocks; }
   std::size_t costly_tiles() const noexcept { return scored().tiles(); }
   TileView costly_tile(std::size_t index) const noexcept { return scored().tile(dimension_, index); }
   const TileBounds& bounds(std::size_t costly_tile) const noexcept { return bounds_[costly_tile]; }

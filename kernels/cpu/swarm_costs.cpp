@@ -10,11 +10,13 @@
 namespace swarmfit::kernels::cpu {
 namespace {
 
-/// Runs of pieces of tiles; few, so that partial sums stay small whatever the size of the cloud.
+/// Runs of tiles that each keep partial sums, which so stay small whatever the size of the cloud.
 constexpr std::size_t kMaxRuns = 128;
-/// Of a tile, at most; where whole ones would have all threads but one wait for longer than this share of the time.
+/// Of a thread, from which on runs hold several pieces: to take one takes longer then than what is left at the end is worth.
+constexpr std::size_t kManyRuns = 128;
+/// A tile is cut in so many pieces at most, and cut where threads would else idle for more than this share of all the work.
 constexpr std::size_t kMostPieces = 4;
-constexpr double kWaiting = 0.01;
+constexpr double kIdle = 0.01;
 static_assert(kTileBlocks % kMostPieces == 0);
 /// Points x models below which looking at the blocks first cannot pay for the extra passes.
 constexpr std::size_t kLeastWork = std::size_t{1} << 18;
@@ -29,42 +31,48 @@ constexpr double kPoorFlat = 0.7, kPoorRound = 0.8;
 
 std::size_t groups_of(std::size_t models) { return (models + kGroupModels - 1) / kGroupModels; }
 
+/// Consecutive pieces of tiles, all of as many blocks but for the last.
 struct Runs {
-  /// Of whole tiles, whatever is evaluated.
-  explicit Runs(const PointStore& store) : Runs(store, std::size_t{1}) {}
+  /// Of whole tiles, whatever is evaluated and by whom.
+  static Runs of_tiles(const PointStore& store) {
+    const std::size_t tiles = store.costly_tiles();
+    return {store, kTileBlocks, (tiles + kMaxRuns - 1) / kMaxRuns};
+  }
   /// Of pieces that make tasks of so many models which the threads can share evenly.
   static Runs for_models(const PointStore& store, std::size_t models) {
-    std::size_t pieces = 1;
-    const auto waits = [&] {
-      const std::size_t tasks = store.costly_tiles() * pieces * groups_of(models), last = tasks % workers();
-      return last != 0 && static_cast<double>(workers() - last) > kWaiting * static_cast<double>(tasks);
+    const std::size_t blocks = store.costly_blocks(), groups = groups_of(models), threads = workers();
+    const auto idle = [&](std::size_t of_piece) {
+      const std::size_t tasks = (blocks + of_piece - 1) / of_piece * groups, each = (tasks + threads - 1) / threads;
+      return static_cast<double>(threads * each * of_piece) > (1 + kIdle) * static_cast<double>(blocks * groups);
     };
-    while (pieces < kMostPieces && waits()) pieces *= 2;
-    return {store, pieces};
+    std::size_t of_piece = kTileBlocks;
+    while (of_piece > kTileBlocks / kMostPieces && threads > 1 && idle(of_piece)) of_piece /= 2;
+    const std::size_t pieces = (blocks + of_piece - 1) / of_piece;
+    return {store, of_piece, std::max<std::size_t>(1, pieces / (kManyRuns * threads))};
   }
 
   std::size_t first(std::size_t run) const { return run * length; }
   std::size_t last(std::size_t run) const { return std::min(pieces, (run + 1) * length); }
   TileView piece(const PointStore& store, std::size_t k) const {
-    TileView tile = store.costly_tile(k / of_tile);
-    const std::size_t most = kTileBlocks / of_tile, before = k % of_tile * most;
-    for (const float*& column : tile.columns) column += column != nullptr ? before * kBlockPoints : 0;
-    tile.caps += before * kBlockPoints;
-    tile.blocks = std::min(most, tile.blocks - std::min(before, tile.blocks));
-    return tile;
+    const std::size_t first = k * of_piece, before = first % kTileBlocks;
+    TileView view = store.costly_tile(first / kTileBlocks);
+    for (const float*& column : view.columns) column += column != nullptr ? before * kBlockPoints : 0;
+    view.caps += before * kBlockPoints;
+    view.blocks = std::min(of_piece, view.blocks - before);
+    return view;
   }
-  std::size_t points, of_tile, pieces, length, count;
+  std::size_t points, of_piece, pieces, length, count;  ///< blocks of a piece, pieces of a run
 
  private:
-  Runs(const PointStore& store, std::size_t pieces_of_tile)
+  Runs(const PointStore& store, std::size_t blocks, std::size_t in_run)
       : points(store.costly()),
-        of_tile(pieces_of_tile),
-        pieces(store.costly_tiles() * of_tile),
-        length((pieces + kMaxRuns - 1) / kMaxRuns),
+        of_piece(blocks),
+        pieces((store.costly_blocks() + of_piece - 1) / of_piece),
+        length(in_run),
         count(length == 0 ? 0 : (pieces + length - 1) / length) {}
 };
 
-/// body(run, first model, models, member) for each run of tiles and group of models; then finish(member).
+/// body(run, first model, models, member) for each run and group of models; then finish(member).
 template <class Body, class Finish>
 void for_tasks(const Runs& runs, std::size_t models, Body&& body, Finish&& finish) {
   const std::size_t groups = groups_of(models);
@@ -148,10 +156,10 @@ void SwarmCosts::sum_units(const PointStore& points, const CentredSwarm& swarm, 
     if (own.swarm != swarm_) {
       own.swarm = swarm_;
       own.lanes.assign(swarm.count * kMaxLanes, 0);
-      own.tiles.assign(swarm.count, 0);
+      own.held.assign(swarm.count, 0);
       own.units.assign(swarm.count, 0);
     }
-    std::size_t& held = own.tiles[first];
+    std::size_t& held = own.held[first];
     for (std::size_t piece = runs.first(run); piece < runs.last(run); ++piece) {
       kernels_.add_units(swarm.kind, summing, runs.piece(points, piece), swarm.coefficients.data() + first * width, models, nullptr,
                          own.lanes.data() + first * kMaxLanes);
@@ -174,12 +182,12 @@ void SwarmCosts::sum_units(const PointStore& points, const CentredSwarm& swarm, 
 }
 
 void SwarmCosts::sum_values(const PointStore& points, const CentredSwarm& swarm, Loss loss, std::span<float> costs) {
-  const Runs runs(points);
+  const Runs runs = Runs::of_tiles(points);
   values_.resize(std::max(values_.size(), runs.count));
   for (std::size_t run = 0; run < runs.count; ++run) values_[run].assign(swarm.count, 0.0);
   const auto add = [&](std::size_t run, std::size_t first, std::size_t models, std::size_t) {
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.add_values(swarm.kind, loss, points.costly_tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
+      kernels_.add_values(swarm.kind, loss, runs.piece(points, tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
                           values_[run].data() + first);
     }
   };

@@ -51,9 +51,9 @@ class OpenGroup {
   std::uint64_t touched_ = 0;
 };
 
-/// Works in the caller's crew, where the work is worth_sharing. By brute force tiles are taken in runs and models in groups: each pair
-/// is a task. Where losses are summed in quanta each thread keeps sums of its own, else each run of tiles has some, which are added up in a
-/// fixed order. With pruning a group of models is a task.
+/// Works in the caller's crew, where the work is worth_sharing. By brute force tiles, or pieces of them, are taken in runs and models in
+/// groups: each pair is a task. Where losses are summed in quanta each thread keeps sums of its own, else each run of tiles has some, which
+/// are added up in a fixed order. With pruning a group of models is a task.
 class SwarmCosts {
  public:
   SwarmCosts(const CpuKernels& kernels, bool pruning) : kernels_(kernels), pruning_(pruning) {}
@@ -82,9 +82,9 @@ class SwarmCosts {
   /// whose they are.
   struct alignas(64) Units {
     std::uint64_t swarm = 0;
-    Aligned<std::int32_t> lanes;     ///< kMaxLanes a model
-    std::vector<std::size_t> tiles;  ///< how many the lanes of a group of models hold, at its first
-    Aligned<std::int64_t> units;     ///< a model
+    Aligned<std::int32_t> lanes;    ///< kMaxLanes a model
+    std::vector<std::size_t> held;  ///< pieces of tiles that the lanes of a group of models hold, at its first
+    Aligned<std::int64_t> units;    ///< a model
   };
   std::vector<Units> units_;             ///< a thread
   std::vector<Aligned<double>> values_;  ///< a run of tiles: floating point, a model
