@@ -9,6 +9,7 @@
 
 #include "host/models/synthetic.hpp"
 #include "host/swarm/lock_step.hpp"
+#include "tests/same_answer.hpp"
 
 namespace swarmfit {
 namespace {
@@ -36,14 +37,7 @@ FitOptions small_fit(int threads, std::string backend = "cpu") {
 
 void expect_same(const Expected<FitResult>& one, const Expected<FitResult>& other) {
   ASSERT_TRUE(one && other);
-  EXPECT_EQ(one->labels, other->labels);
-  EXPECT_EQ(one->stop_reason, other->stop_reason);
-  EXPECT_EQ(one->evaluations, other->evaluations);
-  ASSERT_EQ(one->models.size(), other->models.size());
-  for (std::size_t m = 0; m < one->models.size(); ++m) {
-    EXPECT_EQ(one->models[m].parameters, other->models[m].parameters);
-    EXPECT_EQ(one->models[m].covariance, other->models[m].covariance);
-  }
+  tests::expect_same_answer(*one, *other);
 }
 
 TEST(Batch, GivesWhatEachCallGivesOnAnyNumberOfThreads) {

@@ -15,6 +15,7 @@
 #include "host/models/synthetic.hpp"
 #include "host/swarm/fit_call.hpp"
 #include "kernels/evaluators.hpp"
+#include "tests/same_answer.hpp"
 
 namespace swarmfit {
 namespace {
@@ -91,15 +92,9 @@ void expect_same_answer_prepared_or_not(const FitOptions& options, const PointsV
   const auto one = prepared->fit(points), other = plain->fit(points);
   ASSERT_TRUE(one && other);
   EXPECT_GT(told, 0U);
-  EXPECT_EQ(one->labels, other->labels);
-  EXPECT_EQ(one->evaluations, other->evaluations);
+  tests::expect_same_answer(*one, *other);
   EXPECT_EQ(one->points_touched, other->points_touched);
   EXPECT_EQ(one->iterations, other->iterations);
-  ASSERT_EQ(one->models.size(), other->models.size());
-  for (std::size_t m = 0; m < one->models.size(); ++m) {
-    EXPECT_EQ(one->models[m].parameters, other->models[m].parameters);
-    EXPECT_EQ(one->models[m].covariance, other->models[m].covariance);
-  }
   EXPECT_EQ(prepared->options().iterations, options.iterations);
   EXPECT_EQ(prepared->options().threshold, options.threshold);
 }
@@ -148,9 +143,7 @@ TEST(FitPrepared, ARehearsalGoesAllTheWay) {
 TEST_P(FitKinds, SameAnswerOnOneThreadAndTwo) {
   const auto one = fit_made(3, 1), two = fit_made(3, 2);
   ASSERT_TRUE(one && two);
-  EXPECT_EQ(one->labels, two->labels);
-  ASSERT_EQ(one->models.size(), two->models.size());
-  for (std::size_t m = 0; m < one->models.size(); ++m) EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
+  tests::expect_same_answer(*one, *two);
 }
 
 /// One circle of radius 1 about the origin, 60 points with noise, and outliers about it.
@@ -383,12 +376,7 @@ TEST(FitFundamental, TwoSearchesEndAlikeSideBySideAndOneAfterTheOther) {
       }
       results.push_back(std::move(*result));
     }
-    for (const FitResult& other : results) {
-      EXPECT_EQ(other.labels, results.front().labels);
-      EXPECT_EQ(other.evaluations, results.front().evaluations);
-      ASSERT_EQ(other.models.size(), results.front().models.size());
-      for (std::size_t m = 0; m < other.models.size(); ++m) EXPECT_EQ(other.models[m].parameters, results.front().models[m].parameters);
-    }
+    for (const FitResult& other : results) tests::expect_same_answer(other, results.front());
   }
 }
 

@@ -12,6 +12,8 @@
 
 #include <swarmfit/fit.hpp>
 
+#include "tests/same_answer.hpp"
+
 namespace swarmfit {
 namespace {
 
@@ -317,14 +319,8 @@ TEST(FitMixedOnce, SameAnswerOnOneThreadAndTwo) {
   options.threads = 2;
   const auto two = fit(scene.points(), options), again = fit(scene.points(), options);
   ASSERT_TRUE(one && two && again);
-  EXPECT_EQ(one->labels, two->labels);
-  EXPECT_EQ(again->labels, two->labels);
-  ASSERT_EQ(one->models.size(), two->models.size());
-  for (std::size_t m = 0; m < one->models.size(); ++m) {
-    EXPECT_EQ(one->models[m].type, two->models[m].type);
-    EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
-    EXPECT_EQ(one->models[m].evaluations, two->models[m].evaluations);
-  }
+  tests::expect_same_answer(*one, *two);
+  tests::expect_same_answer(*again, *two);
 }
 
 TEST(FitMixedOnce, FewThinBoxesAreTakenForCylinders) {

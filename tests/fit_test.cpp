@@ -8,6 +8,8 @@
 
 #include <swarmfit/fit.hpp>
 
+#include "tests/same_answer.hpp"
+
 namespace swarmfit {
 namespace {
 
@@ -99,15 +101,7 @@ TEST(Fit, SameSeedSameAnswerOnAnyNumberOfThreads) {
   options.threads = 2;
   const auto two = fit(scene.view(), options);
   ASSERT_TRUE(one && two);
-  ASSERT_EQ(one->models.size(), two->models.size());
-  for (std::size_t m = 0; m < one->models.size(); ++m) {
-    EXPECT_EQ(one->models[m].parameters, two->models[m].parameters);
-    EXPECT_EQ(one->models[m].covariance, two->models[m].covariance);
-    EXPECT_EQ(one->models[m].cost, two->models[m].cost);
-    EXPECT_EQ(one->models[m].evaluations, two->models[m].evaluations);
-  }
-  EXPECT_EQ(one->labels, two->labels);
-  EXPECT_EQ(one->evaluations, two->evaluations);
+  tests::expect_same_answer(*one, *two);
 }
 
 TEST(Fit, SeedsDiffer) {

@@ -37,8 +37,8 @@ class FitCall {
   FitCall(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair, const SwarmObserver& observer,
           const ModelCallback& on_model, Limits limits);
 
-  /// A fit of one model of the first kind to a few made-up points, of which nothing stays but that code and memory have been touched. Models
-  /// found: none of an own kind, for which nothing is made up. Fails as run() does.
+  /// A fit of one model of the first kind to a few made-up points, of which nothing stays but that code and memory have been touched.
+  /// Models found: none of an own kind, for which nothing is made up. Fails as run() does.
   static Expected<std::size_t> rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair);
 
   /// Fails with bad_input, backend_unavailable where it does not take so much work, and whatever the back end reports. All but the result's

@@ -355,15 +355,10 @@ void PointPasses::claim(const PointsView& points, std::span<const float> toleran
     std::uint8_t* const claimed = claimed_.data() + run * models.size();
     for (std::size_t m = 0; m < models.size(); ++m) {
       std::array<float, kMaxCoefficients> coefficients{};
-      claimed[m] = 0;
-      if (!bench.centre(models[m], coefficients.data())) {
-        of_run[m].cost += bench.be_nowhere(told);
-        continue;
-      }
-      claimed[m] = kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1), nearest.data(),
-                                  label.data(), of_run[m].cost)
-                       ? 1
-                       : 0;
+      const bool usable = bench.centre(models[m], coefficients.data());
+      if (!usable) of_run[m].cost += bench.be_nowhere(told);
+      claimed[m] = usable && kernels_.claim(models[m].kind, bench.strip, coefficients.data(), static_cast<std::int32_t>(m + 1),
+                                            nearest.data(), label.data(), of_run[m].cost);
     }
     bench.hand_back(std::uint16_t{0}, labels,
                     [&](std::size_t at, std::size_t count, std::uint16_t* to) { kernels_.end_claim(label.data() + at, count, to); });

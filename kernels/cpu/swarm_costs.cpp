@@ -187,7 +187,7 @@ void SwarmCosts::sum_values(const PointStore& points, const CentredSwarm& swarm,
   for (std::size_t run = 0; run < runs.count; ++run) values_[run].assign(swarm.count, 0.0);
   const auto add = [&](std::size_t run, std::size_t first, std::size_t models, std::size_t) {
     for (std::size_t tile = runs.first(run); tile < runs.last(run); ++tile) {
-      kernels_.add_values(swarm.kind, loss, runs.piece(points, tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
+      kernels_.add_values(swarm.kind, loss, points.costly_tile(tile), swarm.coefficients.data() + first * width_of(swarm.kind), models,
                           values_[run].data() + first);
     }
   };

@@ -111,7 +111,8 @@ class SWARMFIT_API Fitter {
   Fitter& operator=(Fitter&&) noexcept;
 
   /// Has the first fit take hardly longer than later ones: fits a few made-up points of the first kind, a millisecond or two on a CPU, so
-  /// that code and memory have been touched and most of a device's pipelines compiled. Results are the same with or without it. Does nothing for an own model.
+  /// that code and memory have been touched and most of a device's pipelines compiled. Results are the same with or without it. Does nothing
+  /// for an own model.
   void prepare() noexcept;
 
   /// `warm_start`: models of an earlier fit that seed the swarm. Fails with bad_input (too few finite points, wrong dimension,
