@@ -3,15 +3,22 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <new>
 #include <numeric>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#if defined(__linux__)
+#include <sched.h>
+#endif
+
 #include "kernels/cpu/tasks.hpp"
+#include "kernels/cpu/wake_elsewhere.hpp"
 
 namespace swarmfit::kernels::cpu {
 namespace {
@@ -111,6 +118,99 @@ TEST_P(CrewOf, WorksBesideOthers) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, CrewOf, testing::Values(1, 2, 3, 8));
+
+#if defined(__linux__)
+
+cpu_set_t processors_of(ThreadNumber thread) {
+  cpu_set_t its;
+  CPU_ZERO(&its);
+  sched_getaffinity(thread, sizeof its, &its);
+  return its;
+}
+
+/// Puts the calling thread where it was when it goes out of scope.
+class OnOneProcessor {
+ public:
+  OnOneProcessor() : before_(processors_of(0)) {
+    cpu_set_t here;
+    CPU_ZERO(&here);
+    CPU_SET(static_cast<std::size_t>(sched_getcpu()), &here);
+    sched_setaffinity(0, sizeof here, &here);
+  }
+  ~OnOneProcessor() { sched_setaffinity(0, sizeof before_, &before_); }
+  OnOneProcessor(const OnOneProcessor&) = delete;
+  OnOneProcessor& operator=(const OnOneProcessor&) = delete;
+
+ private:
+  cpu_set_t before_;
+};
+
+TEST(WakeElsewhere, KeepsAThreadOffTheCallersProcessorUntilItMayRoam) {
+  std::atomic<ThreadNumber> number = 0;
+  std::jthread sleeper([&](const std::stop_token& stop) {
+    number = this_thread();
+    number.notify_one();
+    while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  number.wait(0);
+  const cpu_set_t all = processors_of(number);
+  if (CPU_COUNT(&all) < 2) GTEST_SKIP() << "one processor";
+  const OnOneProcessor stay;
+  const auto here = static_cast<std::size_t>(sched_getcpu());
+  const auto kept_off = [&] {
+    const cpu_set_t its = processors_of(number);
+    return CPU_ISSET(here, &its) == 0 && CPU_COUNT(&its) == CPU_COUNT(&all) - 1;
+  };
+  const auto roams = [&] {
+    const cpu_set_t its = processors_of(number);
+    return CPU_EQUAL(&its, &all) != 0;
+  };
+  WakeElsewhere one(1), another(1), none(0);
+  one.keep_off(number);
+  EXPECT_TRUE(kept_off());
+  another.keep_off(number);  // it is already, and who did it lets it roam
+  another.let_roam();
+  EXPECT_TRUE(kept_off());
+  one.let_roam();
+  EXPECT_TRUE(roams());
+  none.keep_off(number);
+  EXPECT_TRUE(roams());
+  {
+    WakeElsewhere gone(1);
+    gone.keep_off(number);
+    EXPECT_TRUE(kept_off());
+  }
+  EXPECT_TRUE(roams());
+  // A thread with no other processor stays where it is.
+  const cpu_set_t only = processors_of(0);
+  sched_setaffinity(number, sizeof only, &only);
+  one.keep_off(number);
+  const cpu_set_t its = processors_of(number);
+  EXPECT_TRUE(CPU_EQUAL(&its, &only));
+}
+
+TEST_P(CrewOf, LeavesEveryThreadTheProcessorsItHad) {
+  const cpu_set_t own = processors_of(0);
+  constexpr int kCallers = 3;
+  std::vector<std::jthread> callers;
+  callers.reserve(kCallers);
+  for (int caller = 0; caller < kCallers; ++caller) {
+    callers.emplace_back([&] {
+      Crew crew(GetParam());
+      for (int again = 0; again < 20; ++again) {
+        done_by(crew, 9);
+        std::this_thread::sleep_for(std::chrono::microseconds(1500));  // helpers are about to go, or have gone
+      }
+    });
+  }
+  callers.clear();
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+    const cpu_set_t its = processors_of(std::stoi(task.path().filename().string()));
+    EXPECT_TRUE(CPU_EQUAL(&its, &own)) << task.path();
+  }
+}
+
+#endif
 
 TEST(Tasks, RunWithoutACrewAsWell) {
   std::vector<std::atomic<int>> times(40);

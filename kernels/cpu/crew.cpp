@@ -49,7 +49,8 @@ struct Crew::Shared {
   struct alignas(64) Share {
     std::atomic<std::size_t> next = 0;
     std::size_t end = 0;
-    std::atomic_flag taken;  ///< a helper is this member
+    std::atomic_flag taken;                 ///< a helper is this member
+    std::atomic<ThreadNumber> sleeper = 0;  ///< the thread that was, since it went and until it comes again, as whatever member
   };
   std::vector<Share> shares;  ///< a member; the caller's first
 
@@ -97,8 +98,16 @@ struct Crew::Shared {
     return member;
   }
 
+  void wake_up() noexcept {
+    for (Share& share : shares) {
+      ThreadNumber mine = this_thread();
+      share.sleeper.compare_exchange_strong(mine, 0, std::memory_order_relaxed);
+    }
+  }
+
   /// Helps with what there is and what comes, and goes when nothing has come for a while.
   void help() {
+    wake_up();
     const std::size_t own = become_member();
     std::uint64_t done = 0;
     auto since = Clock::now();
@@ -118,6 +127,7 @@ struct Crew::Shared {
       if (Clock::now() - since > kAwake) break;
       if (looks > kLooks) std::this_thread::yield();
     }
+    shares[own].sleeper.store(this_thread(), std::memory_order_relaxed);
     shares[own].taken.clear(std::memory_order_release);
     awake.fetch_sub(1);  // who waits for this ends the arena
   }
@@ -140,6 +150,7 @@ class Crew::Arena {
 Crew::Crew(int threads)
     : helpers_(threads - 1),
       shared_(std::make_shared<Shared>(static_cast<std::size_t>(threads))),
+      elsewhere_(static_cast<std::size_t>(helpers_)),
       arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
   if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
@@ -156,6 +167,8 @@ Crew::~Crew() {
 
 void Crew::call_helpers(std::size_t wanted) {
   const int most = static_cast<int>(std::min(wanted, static_cast<std::size_t>(helpers_)));
+  if (shared_->awake.load(std::memory_order_relaxed) >= most) return;
+  for (const Shared::Share& share : shared_->shares) elsewhere_.keep_off(share.sleeper.load(std::memory_order_relaxed));
   while (shared_->awake.load(std::memory_order_relaxed) < most) {
     shared_->awake.fetch_add(1);
     try {
@@ -187,6 +200,7 @@ void Crew::run(std::size_t tasks, const Work& work, void* context) {
     breathe();
     if (looks > kLooks) std::this_thread::yield();
   }
+  elsewhere_.let_roam();
   if (shared.failed.test()) std::rethrow_exception(std::exchange(shared.failure, nullptr));
 }
 

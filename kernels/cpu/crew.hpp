@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <memory>
 
+#include "kernels/cpu/wake_elsewhere.hpp"
+
 namespace swarmfit::kernels::cpu {
 
 /// Tasks on oneTBB's threads, begun within a microsecond. A thread that TBB has sent to sleep takes tens of them to wake, as long as one
@@ -36,6 +38,7 @@ class Crew {
 
   int helpers_;
   std::shared_ptr<Shared> shared_;
+  WakeElsewhere elsewhere_;
   std::unique_ptr<Arena> arena_;
 };
 
