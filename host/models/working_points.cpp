@@ -53,6 +53,7 @@ WorkingPoints::WorkingPoints(const PointsView& points, kernels::Survey survey) :
   scatter /= static_cast<double>(survey_.finite_count);
   const double variance = scatter.trace();
   frame_.scale = variance > 0 && std::isfinite(variance) ? std::sqrt(variance) : 1.0;
+  per_scale_ = 1 / frame_.scale;
   const Eigen::Vector4d spread = Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
   // Float coordinates of a perfect line leave it by some 1e-7 of their size.
   const double size = spread[3];

@@ -82,8 +82,8 @@ class WorkingPoints {
     view.finite_rows = survey_.finite.data();
     return view;
   }
-  double at(std::size_t i, int d) const noexcept { return (view_.at(i, d) - frame_.centre[static_cast<std::size_t>(d)]) / frame_.scale; }
-  /// The point's columns, read at once: for those who read a great many.
+  double at(std::size_t i, int d) const noexcept { return (view_.at(i, d) - frame_.centre[static_cast<std::size_t>(d)]) * per_scale_; }
+  /// The point's columns, read at once.
   template <std::size_t D>
   std::array<double, D> row(std::size_t i) const noexcept {
     std::array<double, D> p;
@@ -95,15 +95,12 @@ class WorkingPoints {
       std::memcpy(narrow.data(), at, sizeof narrow);
       for (std::size_t d = 0; d < D; ++d) p[d] = static_cast<double>(narrow[d]);
     }
-    const double share = 1 / frame_.scale;
-    for (std::size_t d = 0; d < D; ++d) p[d] = (p[d] - frame_.centre[d]) * share;
+    for (std::size_t d = 0; d < D; ++d) p[d] = (p[d] - frame_.centre[d]) * per_scale_;
     return p;
   }
   template <int D>
   Eigen::Matrix<double, D, 1> point(std::size_t i) const noexcept {
-    Eigen::Matrix<double, D, 1> p;
-    for (int d = 0; d < D; ++d) p[d] = at(i, d);
-    return p;
+    return Eigen::Matrix<double, D, 1>(row<static_cast<std::size_t>(D)>(i).data());
   }
 
   /// Unit normals, one a point; those that are not known are zero. None are known until they are set.
@@ -151,7 +148,8 @@ class WorkingPoints {
   kernels::PointsView view_;
   kernels::Survey survey_;
   Frame frame_;
-  double reach_ = 0;  ///< about what the farthest coordinate is; a survey holds what it sums within kFarthest of a point nearby
+  double per_scale_ = 1;  ///< one over the frame's scale
+  double reach_ = 0;      ///< about what the farthest coordinate is; a survey holds what it sums within kFarthest of a point nearby
   int rank_ = 0;
   std::vector<Eigen::Vector3f> normals_;
 };

@@ -10,44 +10,42 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr int kCellBits = 16;        // of a column
-constexpr int kSampleCellBits = 11;  // where a part of the cloud is sorted, whose points are farther apart: three digits instead of five
-
-/// Interleaves the bits of the quantised columns.
-std::uint64_t morton(const models::WorkingPoints& points, std::size_t i, int bits) {
-  const int dim = points.dimension();
-  const kernels::BitSpread spread(dim);
+/// Interleaves the bits of the quantised columns, of `bits` each.
+template <std::size_t D>
+std::uint64_t morton(const std::array<double, D>& p, const kernels::BitSpread& spread, int bits) {
   std::uint64_t code = 0;
-  for (int d = 0; d < dim; ++d) {
+  for (std::size_t d = 0; d < D; ++d) {
     // The working frame has unit spread: +-4 holds all but far outliers, which are clamped.
-    const double t = std::clamp((points.at(i, d) + 4.0) / 8.0, 0.0, 1.0);
+    const double t = std::clamp((p[d] + 4.0) / 8.0, 0.0, 1.0);
     const auto cell = static_cast<std::uint32_t>(t * ((1U << bits) - 1U));
-    code |= spread(cell) << (dim - 1 - d);
+    code |= spread(cell) << (D - 1 - d);
   }
   return code;
 }
 
+template <class Code>
 struct Coded {
-  std::uint64_t code;
+  Code code;
   std::uint32_t index;
 };
 
 /// Sorts by code; what has the same stays in its order. A digit of so many bits at a time, from the lowest.
-template <int DigitBits>
-void sort_by_digits(std::vector<Coded>& coded, int bits) {
+template <int DigitBits, class Code>
+void sort_by_digits(std::vector<Coded<Code>>& coded, int bits) {
   constexpr std::size_t kDigits = std::size_t{1} << DigitBits;
-  std::vector<Coded> room(coded.size());
+  std::vector<Coded<Code>> room(coded.size());
   for (int shift = 0; shift < bits; shift += DigitBits) {
     std::array<std::uint32_t, kDigits> at{};
-    const auto digit = [&](const Coded& one) { return (one.code >> shift) & (kDigits - 1); };
-    for (const Coded& one : coded) ++at[digit(one)];
+    const auto digit = [&](const Coded<Code>& one) { return (one.code >> shift) & (kDigits - 1); };
+    for (const Coded<Code>& one : coded) ++at[digit(one)];
     std::exclusive_scan(at.begin(), at.end(), at.begin(), 0U);
-    for (const Coded& one : coded) room[at[digit(one)]++] = one;
+    for (const Coded<Code>& one : coded) room[at[digit(one)]++] = one;
     coded.swap(room);
   }
 }
 
-void sort_by_code(std::vector<Coded>& coded, int bits) {
+template <class Code>
+void sort_by_code(std::vector<Coded<Code>>& coded, int bits) {
   constexpr std::size_t kFew = 4096;  // to count many digits would take as long as to count the points
   coded.size() < kFew ? sort_by_digits<8>(coded, bits) : sort_by_digits<11>(coded, bits);
 }
@@ -60,17 +58,35 @@ void share(kernels::FitnessEvaluator* workers, std::size_t count, Some&& some) {
   workers->share_out((count + kRange - 1) / kRange, [&](std::size_t k) { some(k * kRange, std::min(count, (k + 1) * kRange)); });
 }
 
+template <std::size_t D, class Code>
+std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part, int bits,
+                                           kernels::FitnessEvaluator* workers) {
+  std::vector<Coded<Code>> coded(part.size());
+  const kernels::BitSpread spread(static_cast<int>(D));
+  share(workers, part.size(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t k = first; k < last; ++k) coded[k] = {static_cast<Code>(morton<D>(points.row<D>(part[k]), spread, bits)), part[k]};
+  });
+  sort_by_code(coded, bits * static_cast<int>(D));
+  std::vector<std::uint32_t> index(coded.size());
+  std::transform(coded.begin(), coded.end(), index.begin(), [](const Coded<Code>& one) { return one.index; });
+  return index;
+}
+
 std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part,
                                            kernels::FitnessEvaluator* workers) {
-  const int bits = part.size() < points.finite_count() ? kSampleCellBits : kCellBits;
-  std::vector<Coded> coded(part.size());
-  share(workers, part.size(), [&](std::size_t first, std::size_t last) {
-    for (std::size_t k = first; k < last; ++k) coded[k] = {morton(points, part[k], bits), part[k]};
-  });
-  sort_by_code(coded, bits * points.dimension());
-  std::vector<std::uint32_t> index(coded.size());
-  std::transform(coded.begin(), coded.end(), index.begin(), [](const Coded& one) { return one.index; });
-  return index;
+  constexpr int kCellBits = 16;  // of a column
+  // Points of a part of the cloud are farther apart, and two digits, or four, tell them apart as well.
+  constexpr int kPartCellBits = 11, kPartCellBitsOf3 = 7;
+  const bool all = part.size() == points.finite_count();
+  switch (points.dimension()) {
+    case 2:
+      return all ? in_morton_order<2, std::uint32_t>(points, part, kCellBits, workers)
+                 : in_morton_order<2, std::uint32_t>(points, part, kPartCellBits, workers);
+    case 3:
+      return all ? in_morton_order<3, std::uint64_t>(points, part, kCellBits, workers)
+                 : in_morton_order<3, std::uint32_t>(points, part, kPartCellBitsOf3, workers);
+    default: return in_morton_order<4, std::uint64_t>(points, part, all ? kCellBits : kPartCellBits, workers);
+  }
 }
 
 constexpr std::size_t kUsual = 3 * sizeof(float);  // bytes of a row, which a copy of known size is quickest for

@@ -71,7 +71,7 @@ struct Open {
 };
 
 /// Points that a pass over the caller's memory takes at a time.
-inline constexpr std::size_t kStripPoints = 512;
+inline constexpr std::size_t kStripPoints = 1024;
 
 /// A strip of rows in columns, about a pivot among them. `limit` is what a distance may be; less than 0 for rows that are not finite,
 /// whose columns are 0, and for those that fill the strip up to a whole number of the widest vectors.

@@ -15,10 +15,18 @@
 namespace swarmfit::kernels::cpu {
 namespace {
 
-constexpr std::size_t kRunStrips = 8;
-constexpr std::size_t kRunPoints = kRunStrips * kStripPoints;
+std::size_t strip_count(const PointsView& points) { return (points.count + kStripPoints - 1) / kStripPoints; }
 
-std::size_t run_count(const PointsView& points) { return (points.count + kRunPoints - 1) / kRunPoints; }
+/// Consecutive strips make a task, and have sums of their own: one where strips are few, so that there is enough to share.
+std::size_t run_strips(const PointsView& points) {
+  constexpr std::size_t kMost = 4, kTasks = 16;
+  return std::clamp(strip_count(points) / kTasks, std::size_t{1}, kMost);
+}
+
+std::size_t run_count(const PointsView& points) {
+  const std::size_t each = run_strips(points);
+  return (strip_count(points) + each - 1) / each;
+}
 
 using Pivot = std::array<double, kMaxDimension>;
 
@@ -279,10 +287,10 @@ bool clearly_solid(int dimension, const Moments& moments) {
 /// body(bench, run, strip) for each strip, a task for each run of them.
 template <class Body>
 void for_strips(const PointsView& points, Body&& body) {
-  const std::size_t strips = (points.count + kStripPoints - 1) / kStripPoints;
+  const std::size_t strips = strip_count(points), each = run_strips(points);
   for_each_task(run_count(points), [&](std::size_t run) {
     Bench bench;
-    for (std::size_t strip = run * kRunStrips; strip < std::min(strips, (run + 1) * kRunStrips); ++strip) body(bench, run, strip);
+    for (std::size_t strip = run * each; strip < std::min(strips, (run + 1) * each); ++strip) body(bench, run, strip);
   });
 }
 

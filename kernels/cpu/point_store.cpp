@@ -12,7 +12,7 @@ namespace swarmfit::kernels::cpu {
 namespace {
 
 /// Rows a task reads. Fixed, so that the centre does not depend on the number of threads.
-constexpr std::size_t kChunkRows = 16384;
+constexpr std::size_t kChunkRows = 2048;
 /// Points of a cloud whose memory counts for more than the time to ask for it anew.
 constexpr std::size_t kLarge = std::size_t{1} << 20;
 /// Blocks from which on their being small is worth the sort: of fewer, all are computed in no time.
