@@ -309,6 +309,35 @@ TEST_P(FitMixed, AnOutlineDoesNotWidenWhatItSurrounds) {
   EXPECT_NEAR(radius(result->models[0]), 0.04, 0.06 * 0.04) << told(*result);
 }
 
+TEST_P(FitMixed, ThePlaneThatStandsOutIsToldFirst) {
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  const Scene scene = table_scene(seed + 1100);
+  std::vector<ModelType> told_of;
+  const auto result =
+      fit(scene.points(), options_for({ModelType::cylinder, ModelType::sphere, ModelType::plane}, seed), [&](const Model& model) {
+        told_of.push_back(model.type);
+        return told_of.size() == 1 ? Verdict::stop : Verdict::go_on;
+      });
+  ASSERT_TRUE(result) << result.error().message;
+  ASSERT_EQ(told_of, std::vector{ModelType::plane});
+  ASSERT_EQ(result->models.size(), 1U);
+  EXPECT_GT(std::abs(result->models[0].normal().z()), 0.999);
+  EXPECT_NEAR(result->models[0].offset(), 0, 0.002);
+}
+
+TEST_P(FitMixed, WhatIsBentIsNoPlaneThatStandsOut) {
+  // A third of the barrel lies within tau of one plane, which is more than any plane there holds.
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  Scene scene(seed + 1200);
+  scene.half_cylinder(Vector(0, 0, 0), 0.15, 0.5, 12000, 0, 2);
+  scene.outliers(500);
+  const auto result = fit(scene.points(), options_for({ModelType::plane, ModelType::cylinder}, seed));
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(result->models[0].type, ModelType::cylinder) << told(*result);
+  expect_radii(*result, ModelType::cylinder, std::array{0.15});
+  EXPECT_TRUE(radii(*result, ModelType::plane).empty()) << told(*result);
+}
+
 INSTANTIATE_TEST_SUITE_P(Seeds, FitMixed, testing::Range(1, 6));
 
 TEST(FitMixedOnce, SameAnswerOnOneThreadAndTwo) {

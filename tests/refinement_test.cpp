@@ -1,4 +1,5 @@
 // Refinement never worsens what it refines.
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -111,6 +112,40 @@ TEST_F(Refinement, UniqueSupportOfTwinsIsNothing) {
   EXPECT_LT((*unique)[0], 3U);
   EXPECT_LT((*unique)[1], 3U);
   EXPECT_GT((*unique)[2], 100U);
+}
+
+TEST_F(Refinement, WhatOthersLeaveIsTheDistanceToTheNearestOfThem) {
+  std::vector<double> rows = rows_;
+  for (const std::size_t hole : {0U, 7U, 599U}) rows[2 * hole] = std::nan("");
+  const models::WorkingPoints points{PointsView(std::span<const double>(rows), 2)};
+  const Ground ground{*evaluator_, *space_, points, kTau};
+  const auto circle = models::make_space(ModelType::circle2d, {});
+  const std::vector<models::Placed> models{{space_.get(), space_->from_data(Eigen::Vector3d(0, 1, -0.5), points.frame())},
+                                           {circle.get(), circle->from_data(Eigen::Vector3d(0.5, 0.5, 0.2), points.frame())},
+                                           {space_.get(), space_->from_data(Eigen::Vector3d(1, 0, -0.3), points.frame())}};
+  const auto distances = measure(ground, models);
+  const auto nearest = TwoNearest::of(ground, models);
+  ASSERT_TRUE(distances && nearest);
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    std::vector<float> left(points.size(), -1.0F);
+    nearest->left_by_others(ground, m, left);
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      float expected = points.finite(i) ? kTau : 0.0F;
+      for (std::size_t other = 0; other < models.size(); ++other) {
+        if (other != m && points.finite(i)) expected = std::min(expected, (*distances)[other][i]);
+      }
+      ASSERT_EQ(left[i], expected) << "model " << m << ", point " << i;
+    }
+  }
+}
+
+TEST_F(Refinement, AloneNothingIsLeftByOthers) {
+  const Ground ground{*evaluator_, *space_, points_, kTau};
+  const auto nearest = TwoNearest::of(ground, std::vector<models::Placed>{{space_.get(), off(0.4, 0.2, 0, 0)}});
+  ASSERT_TRUE(nearest);
+  std::vector<float> left(points_.size());
+  nearest->left_by_others(ground, 0, left);
+  EXPECT_EQ(left, caps_);
 }
 
 TEST(Distances, OfARunAreThoseOfAPassOverAll) {

@@ -7,7 +7,7 @@
 namespace swarmfit::models {
 namespace {
 
-constexpr int kSteps = 6;             // of Gauss-Newton; starting points are good, and callers repeat
+constexpr int kSteps = 3;             // of Gauss-Newton; starting points are good, and callers reweight and repeat
 constexpr int kHalvings = 4;          // of damping before a step is given up
 constexpr double kSettled = 1e-4;     // relative fall of the squares below which steps end; callers reweight, or fit again
 constexpr double kLeastRank = 1e-12;  // of the information matrix: below, the points do not determine the model
@@ -19,9 +19,18 @@ constexpr std::size_t kKept = std::size_t{1} << 16;  // points of a support that
 SupportRows::SupportRows(const WorkingPoints& points, const Weighted& support)
     : points_(points), support_(support), width_(static_cast<std::size_t>(points.dimension())) {
   if (size() > kKept) return;
-  std::vector<double> rows(size() * width_);
-  for (std::size_t k = 0; k < size(); ++k) {
-    for (std::size_t d = 0; d < width_; ++d) rows[k * width_ + d] = points.at(support.index[k], static_cast<int>(d));
+  std::vector<double> rows;
+  rows.reserve(size() * width_);
+  const auto keep = [&]<std::size_t D>(std::integral_constant<std::size_t, D>) {
+    for (const std::uint32_t i : support.index) {
+      const std::array<double, D> row = points.row<D>(i);
+      rows.insert(rows.end(), row.begin(), row.end());
+    }
+  };
+  switch (width_) {
+    case 2: keep(std::integral_constant<std::size_t, 2>()); break;
+    case 3: keep(std::integral_constant<std::size_t, 3>()); break;
+    default: keep(std::integral_constant<std::size_t, 4>());
   }
   kept_ = std::move(rows);
 }

@@ -10,19 +10,20 @@ namespace swarmfit::models {
 namespace {
 
 /// The candidates' coordinates as nanoflann asks for them.
+template <std::size_t D>
 struct Rows {
   std::vector<float> values;
-  std::size_t columns = 0;
 
-  std::size_t kdtree_get_point_count() const { return columns == 0 ? 0 : values.size() / columns; }
-  float kdtree_get_pt(std::size_t row, std::size_t column) const { return values[row * columns + column]; }
+  std::size_t kdtree_get_point_count() const { return values.size() / D; }
+  float kdtree_get_pt(std::size_t row, std::size_t column) const { return values[row * D + column]; }
   template <class Box>
   bool kdtree_get_bbox(Box&) const {
     return false;
   }
 };
 
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Rows>, Rows, -1, std::uint32_t>;
+template <std::size_t D>
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Rows<D>>, Rows<D>, static_cast<int>(D), std::uint32_t>;
 
 /// Of the plane through a point and its neighbours; zero where those have no one plane.
 Eigen::Vector3f normal_of(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::uint32_t point,
@@ -53,34 +54,46 @@ void for_runs(std::size_t count, kernels::FitnessEvaluator* workers, Body&& body
   workers->share_out((count + kRun - 1) / kRun, [&](std::size_t run) { body(run * kRun, std::min(count, (run + 1) * kRun)); });
 }
 
+/// Places of the `count` candidates nearest to each, one after the other.
+template <std::size_t D>
+std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
+                                           kernels::FitnessEvaluator* workers) {
+  constexpr std::size_t kLeaf = 24;  // points that are looked at one after the other
+  Rows<D> rows;
+  rows.values.reserve(candidates.size() * D);
+  for (const std::uint32_t i : candidates) {
+    for (const double x : points.row<D>(i)) rows.values.push_back(static_cast<float>(x));
+  }
+  const Tree<D> tree(static_cast<int>(D), rows, nanoflann::KDTreeSingleIndexAdaptorParams(kLeaf));
+  std::vector<std::uint32_t> nearest(candidates.size() * count);
+  for_runs(candidates.size(), workers, [&](std::size_t first, std::size_t last) {
+    std::vector<std::uint32_t> place(count + 1);
+    std::vector<float> square(count + 1);
+    std::vector<std::pair<float, std::uint32_t>> sorted;
+    for (std::size_t c = first; c < last; ++c) {
+      const std::size_t found = tree.knnSearch(&rows.values[c * D], count + 1, place.data(), square.data());
+      sorted.clear();
+      for (std::size_t k = 0; k < found; ++k) {
+        if (place[k] != c) sorted.emplace_back(square[k], place[k]);
+      }
+      std::sort(sorted.begin(), sorted.end());  // many duplicates may have crowded the point itself out of its own list
+      for (std::size_t k = 0; k < count; ++k) nearest[c * count + k] = sorted[k].second;
+    }
+  });
+  return nearest;
+}
+
 }  // namespace
 
 Neighbours::Neighbours(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
                        kernels::FitnessEvaluator* workers) {
   count_ = candidates.empty() ? 0 : std::min(count, candidates.size() - 1);
   if (count_ == 0) return;
-  Rows rows;
-  rows.columns = static_cast<std::size_t>(points.dimension());
-  rows.values.reserve(candidates.size() * rows.columns);
-  for (const std::uint32_t i : candidates) {
-    for (int d = 0; d < points.dimension(); ++d) rows.values.push_back(static_cast<float>(points.at(i, d)));
+  switch (points.dimension()) {
+    case 2: nearest_ = nearest_of_each<2>(points, candidates, count_, workers); return;
+    case 3: nearest_ = nearest_of_each<3>(points, candidates, count_, workers); return;
+    default: nearest_ = nearest_of_each<4>(points, candidates, count_, workers);
   }
-  const Tree tree(points.dimension(), rows);
-  nearest_.resize(candidates.size() * count_);
-  for_runs(candidates.size(), workers, [&](std::size_t first, std::size_t last) {
-    std::vector<std::uint32_t> place(count_ + 1);
-    std::vector<float> square(count_ + 1);
-    std::vector<std::pair<float, std::uint32_t>> sorted;
-    for (std::size_t c = first; c < last; ++c) {
-      const std::size_t found = tree.knnSearch(&rows.values[c * rows.columns], count_ + 1, place.data(), square.data());
-      sorted.clear();
-      for (std::size_t k = 0; k < found; ++k) {
-        if (place[k] != c) sorted.emplace_back(square[k], place[k]);
-      }
-      std::sort(sorted.begin(), sorted.end());  // many duplicates may have crowded the point itself out of its own list
-      for (std::size_t k = 0; k < count_; ++k) nearest_[c * count_ + k] = sorted[k].second;
-    }
-  });
 }
 
 std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates,

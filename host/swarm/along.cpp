@@ -76,13 +76,14 @@ Expected<> refine_along(const Ground& whole, std::vector<models::Placed>& found,
   if (whole.points.dimension() != 3 || std::none_of(found.begin(), found.end(), is_round)) return {};
   std::vector<models::Placed> all = found;
   all.insert(all.end(), hidden.begin(), hidden.end());
-  const auto distances = measure(whole, all);
-  if (!distances) return tl::unexpected(distances.error());
-  std::vector<float> left(whole.size()), allowed;
+  const auto nearest = TwoNearest::of(whole, all);
+  if (!nearest) return tl::unexpected(nearest.error());
+  std::vector<float> left(whole.size()), distances(whole.size()), allowed;
   for (std::size_t m = 0; m < found.size(); ++m) {
     if (!is_round(found[m])) continue;
-    left_by_others(whole, *distances, m, left);
-    const std::vector<std::uint32_t> near = surroundings(whole, (*distances)[m], left);
+    nearest->left_by_others(whole, m, left);
+    if (const auto told = weigh(whole.of(*found[m].space), found[m].theta, {}, distances); !told) return tl::unexpected(told.error());
+    const std::vector<std::uint32_t> near = surroundings(whole, distances, left);
     if (near.size() < kFewest) continue;
     const Subset subset(whole.points, near);
     Ground part{.evaluator = whole.evaluator, .space = *found[m].space, .points = whole.points, .tau = whole.tau, .part = &subset};

@@ -198,9 +198,12 @@ Expected<> FitCall::look_closely() {
   spread_ = spread_of(options_.noise, working(), depth_);
   const std::size_t size = part_searched_ ? settings().search_points : kSampledFrom;
   const auto steadiness = part_searched_ ? std::span<const float>(spread_) : std::span<const float>();
-  part_ = swarm::look_closely(working(), keenest(kinds_), Random(options_.seed), size, &evaluator_, steadiness);
+  part_ = part_to_look_at(working(), Random(options_.seed), size, &evaluator_, steadiness);
+  if (!looks_later()) learn_neighbourhoods(*part_, working(), keenest(kinds_), &evaluator_);
   return check_backend(evaluator_, kinds_, part_searched_ ? part_->points.index().size() : working().size());
 }
+
+bool FitCall::looks_later() const { return kinds_.size() > 1 && fixed_threshold(options_).has_value(); }
 
 Expected<> FitCall::settle_threshold(FitResult& result) {
   if (const auto fixed = fixed_threshold(options_)) {
@@ -228,6 +231,7 @@ Expected<FitCall::Found> FitCall::search(const std::vector<Model>& warm_start, F
   MultiModel search(evaluator_, kinds_, working(), *part_, options_.seed, limits_, spread_);
   search.watched_by(watch());
   if (points_set_) search.points_are_set();
+  if (looks_later()) search.learn_when_needed([&] { learn_neighbourhoods(*part_, working(), keenest(kinds_), &evaluator_); });
   if (auto done = search.run(on_model_, warm_start, result, known_); !done) return tl::unexpected(done.error());
   return found_by(search);
 }

@@ -61,6 +61,8 @@ class FitCall {
   Expected<> thin();
   /// The part that is looked at closely, and what each point's noise is.
   Expected<> look_closely();
+  /// Is that the search's to do, when it has taken the planes that stand out? An estimate of the threshold may ask for it before.
+  bool looks_later() const;
   /// Given, or from the data; then some models are known.
   Expected<> settle_threshold(FitResult& result);
   Expected<Found> search(const std::vector<Model>& warm_start, FitResult& result);

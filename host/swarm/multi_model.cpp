@@ -9,7 +9,8 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kAlike = 0.02;  // share of their saving by which the bests of two swarms that found the same may differ
+constexpr double kStandsOut = 0.2;  // share of the cloud that a plane holds which is taken before other kinds are looked for
+constexpr double kAlike = 0.02;     // share of their saving by which the bests of two swarms that found the same may differ
 
 }  // namespace
 
@@ -47,6 +48,10 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
     if (!pilot_.why_ended().empty() || pilot_.interrupted() || full()) break;
     if (auto done = adopt(model, on_model, result); !done) return done;
   }
+  if (learn_) {
+    if (auto done = take_planes_that_stand_out(seeds, on_model, result); !done) return done;
+    learn_();
+  }
   if (auto done = look_round_by_round(seeds, on_model, result); !done) return done;
   result.stop_reason = pilot_.why_ended();
   if (!ends_jointly() || !problem_.shares_out()) return {};
@@ -54,6 +59,25 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
   share_out_ = std::make_unique<ShareOut>(problem_, left_, pilot_, candidates_);
   if (auto done = share_out_->run(found_, search_.proposals()); !done) return done;
   if (auto why = pilot_.interrupted()) result.stop_reason = std::move(*why);
+  return {};
+}
+
+Expected<> MultiModel::take_planes_that_stand_out(const Seeds& seeds, const ModelCallback& on_model, FitResult& result) {
+  Candidate plane;
+  while (plane.kind < problem_.asked && problem_.space(plane.kind).type() != ModelType::plane) ++plane.kind;
+  if (plane.kind == problem_.asked || problem_.settings.deflation != Deflation::residual) return {};
+  const Worth worth(problem_, left_);
+  const double much = kStandsOut * static_cast<double>(problem_.points.finite_count());
+  while (pilot_.why_ended().empty() && !full()) {
+    Candidate candidate;
+    candidate.kind = plane.kind;
+    pilot_.set_steps(0);
+    auto outcome = search_.explore(pilot_.next_round(), seeds[plane.kind], candidate);
+    if (!outcome) return tl::unexpected(outcome.error());
+    if (*outcome == Outcome::interrupted && !pilot_.interrupted()) pilot_.go_on();  // what is left may yet determine another kind
+    if (*outcome != Outcome::found || static_cast<double>(candidate.support.inliers()) < much || !worth.lies_flat(candidate)) return {};
+    if (auto done = take_found(candidate, on_model, result); !done) return done;
+  }
   return {};
 }
 

@@ -1,6 +1,7 @@
 // Algorithm 2 of Zhou et al. 2010 and what makes it better: one model after another until none pays for itself.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -32,6 +33,10 @@ class MultiModel {
   /// The evaluator has the points of this search already, from one before: setting them again would but sort them anew.
   void points_are_set() noexcept { points_set_ = true; }
 
+  /// `learn` tells the neighbourhoods of the part and the points' normals, which were not known so far. Planes that stand out are taken
+  /// before it is called.
+  void learn_when_needed(std::function<void()> learn) { learn_ = std::move(learn); }
+
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
   /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.
   Expected<> run(const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result, std::span<const Known> known = {});
@@ -62,6 +67,9 @@ class MultiModel {
 
   /// Gives the evaluator what it is to know.
   Expected<> prepare();
+  /// Of several kinds with the plane among them: planes that hold much of the cloud and lie flat. Nothing else explains their points, so
+  /// that there is no need to look at other kinds, nor at normals, before them.
+  Expected<> take_planes_that_stand_out(const Seeds& seeds, const ModelCallback& on_model, FitResult& result);
   /// One round after another until none finds anything.
   Expected<> look_round_by_round(const Seeds& seeds, const ModelCallback& on_model, FitResult& result);
   /// A swarm of each kind, and the best of what they came to.
@@ -92,6 +100,7 @@ class MultiModel {
   Search search_;
   Contest contest_;
   Polish polish_;
+  std::function<void()> learn_;
   std::unique_ptr<ShareOut> share_out_;  // where the joint end of correspondences has begun
   std::vector<models::Placed> found_, hidden_;
   std::vector<std::uint16_t> labels_;

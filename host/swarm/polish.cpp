@@ -1,6 +1,7 @@
 #include "host/swarm/polish.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "host/swarm/local_labels.hpp"
@@ -86,17 +87,17 @@ Expected<> Polish::refine_each(Models& found, std::span<const models::Placed> hi
   // A model found late saw only what earlier ones had left; where two cross, the points there are both theirs. Not so among kinds: a ball
   // lies along the table that it lies on.
   left_.restore();
-  std::vector<std::vector<float>> distances;
+  std::optional<TwoNearest> nearest;
   if (shared) {
     std::vector<models::Placed> all = found;
     all.insert(all.end(), hidden.begin(), hidden.end());
-    auto measured = measure(problem_.ground, all);
+    auto measured = TwoNearest::of(problem_.ground, all);
     if (!measured) return tl::unexpected(measured.error());
-    distances = std::move(*measured);
+    nearest = std::move(*measured);
   }
   for (std::size_t m = 0; m < found.size(); ++m) {
     const models::ModelSpace& of = *found[m].space;
-    if (!distances.empty()) left_by_others(problem_.ground, distances, m, left_.caps());
+    if (nearest) nearest->left_by_others(problem_.ground, m, left_.caps());
     if (auto done = refine_one(problem_.ground.of(of), problem_.settings.loss, left_.caps(), found[m].theta, problem_.full_rounds());
         !done) {
       return tl::unexpected(done.error());

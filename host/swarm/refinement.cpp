@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace swarmfit::swarm {
 namespace {
@@ -166,10 +167,40 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
   return energy;
 }
 
-void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps) {
-  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = std::isnan(distances[model][i]) ? 0.0F : ground.allowed_at(i);
-  for (std::size_t m = 0; m < distances.size(); ++m) {
-    if (m != model) take_nearer(distances[m], caps);
+Expected<TwoNearest> TwoNearest::of(const Ground& ground, std::span<const models::Placed> models) {
+  TwoNearest two;
+  two.nearest_.assign(ground.size(), std::numeric_limits<float>::infinity());
+  two.next_ = two.nearest_;
+  two.whose_.assign(ground.size(), 0);
+  // Model by model: the distances to all of them at once are more than the caches hold.
+  std::vector<float> distances(ground.size());
+  for (std::size_t m = 0; m < models.size(); ++m) {
+    const Ground own = ground.of(*models[m].space);
+    if (const auto told = weigh(own, models[m].theta, {}, distances); !told) return tl::unexpected(told.error());
+    two.meet(static_cast<std::uint32_t>(m), distances);
+  }
+  return two;
+}
+
+void TwoNearest::meet(std::uint32_t model, std::span<const float> distances) {
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const float d = distances[i], nearest = nearest_[i], next = next_[i];
+    const bool closer = d < nearest;
+    const float farther = closer ? nearest : d;
+    next_[i] = farther < next ? farther : next;
+    nearest_[i] = closer ? d : nearest;
+    whose_[i] = closer ? model : whose_[i];
+  }
+  if (model > 0) return;
+  // One pass is enough to tell.
+  for (std::size_t i = 0; i < distances.size(); ++i) nearest_[i] = std::isnan(distances[i]) ? distances[i] : nearest_[i];
+}
+
+void TwoNearest::left_by_others(const Ground& ground, std::size_t model, std::vector<float>& caps) const {
+  for (std::size_t i = 0; i < caps.size(); ++i) {
+    const float left = whose_[i] == model ? next_[i] : nearest_[i], allowed = ground.allowed_at(i);
+    const float least = left < allowed ? left : allowed;
+    caps[i] = std::isnan(nearest_[i]) ? 0.0F : least;
   }
 }
 

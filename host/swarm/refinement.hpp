@@ -1,6 +1,7 @@
 // Refinement of models on their own inliers, one by one and all together.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -92,9 +93,21 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
 /// Distances of the ground's points to each of several models, of whatever kinds; NaN where a point is not finite.
 Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models);
 
-/// What the other models leave of each of the ground's points: its tau, or the distance to the nearest of them. `distances` as by
-/// measure().
-void left_by_others(const Ground& ground, const std::vector<std::vector<float>>& distances, std::size_t model, std::vector<float>& caps);
+/// How far each of the ground's points is from the nearest of several models and from the next.
+class TwoNearest {
+ public:
+  /// Models of whatever kinds.
+  static Expected<TwoNearest> of(const Ground& ground, std::span<const models::Placed> models);
+
+  /// What all models but one leave of each point: its tau, or the distance to the nearest of them; 0 where a point is not finite.
+  void left_by_others(const Ground& ground, std::size_t model, std::vector<float>& caps) const;
+
+ private:
+  void meet(std::uint32_t model, std::span<const float> distances);
+
+  std::vector<float> nearest_, next_;  // NaN where a point is not finite
+  std::vector<std::uint32_t> whose_;   // the nearest
+};
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
 Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models);

@@ -70,11 +70,11 @@ Eigen::MatrixXd covariance(const Ground& whole, const kernels::Evidence& evidenc
 Expected<> refit_apart(const Ground& whole, std::vector<models::Placed>& found, std::span<const models::Placed> hidden) {
   std::vector<models::Placed> all = found;
   all.insert(all.end(), hidden.begin(), hidden.end());
-  const auto distances = measure(whole, all);
-  if (!distances) return tl::unexpected(distances.error());
+  const auto nearest = TwoNearest::of(whole, all);
+  if (!nearest) return tl::unexpected(nearest.error());
   std::vector<float> caps(whole.size()), own_distances(whole.size());
   for (std::size_t m = 0; m < found.size(); ++m) {
-    left_by_others(whole, *distances, m, caps);
+    nearest->left_by_others(whole, m, caps);
     const Ground own = whole.of(*found[m].space);
     const auto evidence = weigh(own, found[m].theta, caps, own_distances);
     if (!evidence) return tl::unexpected(evidence.error());

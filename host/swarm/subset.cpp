@@ -197,20 +197,28 @@ void Subset::gather(std::span<const float> all, std::vector<float>& values) cons
   for (std::size_t k = 0; k < index_.size(); ++k) values[k] = all[index_[k]];
 }
 
-Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
-                  kernels::FitnessEvaluator* workers, std::span<const float> spread) {
-  constexpr std::size_t kNeighbours = 16;
+Part part_to_look_at(const models::WorkingPoints& points, const Random& random, std::size_t size, kernels::FitnessEvaluator* workers,
+                     std::span<const float> spread) {
   const std::vector<std::uint32_t> drawn = spread.empty() ? draw_part(points, random, kSearchedPart, size, workers)
                                                           : draw_steady_part(points, random, kSearchedPart, size, spread);
-  Part part{Subset(points, drawn, workers), {}};
+  return {Subset(points, drawn, workers), {}};
+}
+
+void learn_neighbourhoods(Part& part, models::WorkingPoints& points, const models::ModelSpace& space, kernels::FitnessEvaluator* workers) {
+  constexpr std::size_t kNeighbours = 16;
   const bool correspondences = points.dimension() > 3;
   if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours, workers);
-  if (space.agrees_by_normals()) {
-    const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, part.points.index(), part.neighbours, workers);
-    std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
-    for (std::size_t k = 0; k < known.size(); ++k) normals[part.points.index()[k]] = known[k];
-    points.set_normals(std::move(normals));
-  }
+  if (!space.agrees_by_normals()) return;
+  const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, part.points.index(), part.neighbours, workers);
+  std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
+  for (std::size_t k = 0; k < known.size(); ++k) normals[part.points.index()[k]] = known[k];
+  points.set_normals(std::move(normals));
+}
+
+Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
+                  kernels::FitnessEvaluator* workers, std::span<const float> spread) {
+  Part part = part_to_look_at(points, random, size, workers, spread);
+  learn_neighbourhoods(part, points, space, workers);
   return part;
 }
 

@@ -70,8 +70,13 @@ struct Part {
   models::Neighbours neighbours;  ///< of its points among themselves; empty where nothing asks for them
 };
 
-/// A part of `size` points at most, with neighbourhoods where the kind has use for them. Gives `points` the normals of the part where
-/// the kind looks at them. `spread` is empty or as for draw_steady_part().
+/// A part of `size` points at most, its neighbourhoods not known yet. `spread` is empty or as for draw_steady_part().
+Part part_to_look_at(const models::WorkingPoints& points, const Random& random, std::size_t size,
+                     kernels::FitnessEvaluator* workers = nullptr, std::span<const float> spread = {});
+/// Its neighbourhoods, where the kind has use for them; gives `points` the normals of the part where the kind looks at them.
+void learn_neighbourhoods(Part& part, models::WorkingPoints& points, const models::ModelSpace& space,
+                          kernels::FitnessEvaluator* workers = nullptr);
+/// Both.
 Part look_closely(models::WorkingPoints& points, const models::ModelSpace& space, const Random& random, std::size_t size,
                   kernels::FitnessEvaluator* workers = nullptr, std::span<const float> spread = {});
 

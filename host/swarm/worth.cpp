@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Dense>
+
 #include "host/swarm/swarm.hpp"
 
 namespace swarmfit::swarm {
@@ -17,6 +19,8 @@ constexpr std::size_t kBesides = 8;    // nearest neighbours of a point that are
 constexpr double kThin = 6;            // tau: a cylinder that is wider lies about no box on all sides
 constexpr std::size_t kNext = 4;       // nearest neighbours of a point along it that are asked how far off they are
 constexpr double kEven = 0.8;          // von Neumann's ratio: below, they are off to the same side
+constexpr double kBent = 0.15;         // tau: root mean square of how far a plane's points bend away from it: below, they lie flat,
+constexpr double kGoesOn = 0.1;        // unless so many times as many are right beside it: the surface goes on there, bent
 
 /// How many of a model's points lie along it, of those whose surface is known; one is added so that no points are no cause for doubt.
 class Along {
@@ -93,6 +97,43 @@ bool Worth::is_strewn(const Candidate& candidate) const {
   const Support& support = candidate.support;
   const double beside = static_cast<double>(support.slabs[1]) / static_cast<double>(std::max<std::size_t>(support.inliers(), 1));
   return held(candidate) < kHeld + kHeldPerBeside * beside;
+}
+
+bool Worth::lies_flat(const Candidate& candidate) const {
+  if (problem_.space(candidate.kind).type() != ModelType::plane || !problem_.allowed.empty()) return false;
+  const Support& support = candidate.support;
+  if (static_cast<double>(support.slabs[1]) > kGoesOn * static_cast<double>(support.inliers())) return false;
+  const Eigen::Vector3d normal = candidate.theta.head<3>(), x = normal.unitOrthogonal(), y = normal.cross(x);
+  std::vector<Eigen::Vector3d> own;  // along x and y, and off the plane
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const std::uint32_t i : problem_.part.index()) {
+    if (!(candidate.distances[i] < left_.caps()[i])) continue;
+    const Eigen::Vector3d at = problem_.points.point<3>(i);
+    own.emplace_back(at.dot(x), at.dot(y), at.dot(normal));
+    mean += own.back();
+  }
+  const double count = std::max(1.0, static_cast<double>(own.size()));
+  mean /= count;
+  Eigen::Vector3d square = Eigen::Vector3d::Constant(1e-300);
+  for (Eigen::Vector3d& at : own) {
+    at -= mean;
+    square += at.cwiseAbs2();
+  }
+  // Least squares of how far off they are by 1, u and v, and by u^2, uv and v^2 as well, which are all of size 1.
+  const Eigen::Vector3d size = (square / count).cwiseSqrt();
+  using Terms = Eigen::Matrix<double, 6, 1>;
+  Eigen::Matrix<double, 6, 6> products = Eigen::Matrix<double, 6, 6>::Zero();
+  Terms off = Terms::Zero();
+  for (const Eigen::Vector3d& at : own) {
+    const double u = at[0] / size[0], v = at[1] / size[1];
+    const Terms terms{1, u, v, u * u, u * v, v * v};
+    products += terms * terms.transpose();
+    off += at[2] * terms;
+  }
+  const double by_plane = off.head<3>().dot(products.topLeftCorner<3, 3>().ldlt().solve(off.head<3>()));
+  const double by_bending = off.dot(products.ldlt().solve(off)) - by_plane;
+  const double least = kBent * static_cast<double>(problem_.tau) / problem_.points.frame().scale;
+  return by_bending < least * least * count;
 }
 
 bool Worth::is_cornered(const Candidate& candidate) const {

@@ -31,6 +31,9 @@ class Worth {
   double gathered(const Candidate& candidate) const;
   /// Is a curved model made of what lies here and there?
   bool is_strewn(const Candidate& candidate) const;
+  /// Do a plane's points not bend away from it, towards its rim to the other side than in its middle, and does their surface not go on
+  /// beside it? Then a curved model explains them hardly better, and would have to clearly.
+  bool lies_flat(const Candidate& candidate) const;
   /// Are neighbours off a cylinder to the same side, as those of a box about its edges and its faces are?
   bool is_cornered(const Candidate& candidate) const;
   /// Of what the particles of a swarm know, what saves most of the points that lie along it: fitness knows no normals.
