@@ -167,6 +167,19 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
   return energy;
 }
 
+namespace {
+
+/// some(first, last) for ranges that together make up [0, count), on the threads that share the ground's work.
+template <class Some>
+void in_ranges(const Ground& ground, std::size_t count, Some&& some) {
+  constexpr std::size_t kRange = 16384;  // of points that take a nanosecond each
+  const std::size_t ranges = (count + kRange - 1) / kRange;
+  if (ranges <= 1) return some(std::size_t{0}, count);
+  ground.evaluator.share_out(ranges, [&](std::size_t k) { some(k * kRange, std::min(count, (k + 1) * kRange)); });
+}
+
+}  // namespace
+
 Expected<TwoNearest> TwoNearest::of(const Ground& ground, std::span<const models::Placed> models) {
   TwoNearest two;
   two.nearest_.assign(ground.size(), std::numeric_limits<float>::infinity());
@@ -177,13 +190,14 @@ Expected<TwoNearest> TwoNearest::of(const Ground& ground, std::span<const models
   for (std::size_t m = 0; m < models.size(); ++m) {
     const Ground own = ground.of(*models[m].space);
     if (const auto told = weigh(own, models[m].theta, {}, distances); !told) return tl::unexpected(told.error());
-    two.meet(static_cast<std::uint32_t>(m), distances);
+    in_ranges(ground, distances.size(),
+              [&](std::size_t first, std::size_t last) { two.meet(static_cast<std::uint32_t>(m), distances, first, last); });
   }
   return two;
 }
 
-void TwoNearest::meet(std::uint32_t model, std::span<const float> distances) {
-  for (std::size_t i = 0; i < distances.size(); ++i) {
+void TwoNearest::meet(std::uint32_t model, std::span<const float> distances, std::size_t first, std::size_t last) {
+  for (std::size_t i = first; i < last; ++i) {
     const float d = distances[i], nearest = nearest_[i], next = next_[i];
     const bool closer = d < nearest;
     const float farther = closer ? nearest : d;
@@ -193,15 +207,17 @@ void TwoNearest::meet(std::uint32_t model, std::span<const float> distances) {
   }
   if (model > 0) return;
   // One pass is enough to tell.
-  for (std::size_t i = 0; i < distances.size(); ++i) nearest_[i] = std::isnan(distances[i]) ? distances[i] : nearest_[i];
+  for (std::size_t i = first; i < last; ++i) nearest_[i] = std::isnan(distances[i]) ? distances[i] : nearest_[i];
 }
 
 void TwoNearest::left_by_others(const Ground& ground, std::size_t model, std::vector<float>& caps) const {
-  for (std::size_t i = 0; i < caps.size(); ++i) {
-    const float left = whose_[i] == model ? next_[i] : nearest_[i], allowed = ground.allowed_at(i);
-    const float least = left < allowed ? left : allowed;
-    caps[i] = std::isnan(nearest_[i]) ? 0.0F : least;
-  }
+  in_ranges(ground, caps.size(), [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = first; i < last; ++i) {
+      const float left = whose_[i] == model ? next_[i] : nearest_[i], allowed = ground.allowed_at(i);
+      const float least = left < allowed ? left : allowed;
+      caps[i] = std::isnan(nearest_[i]) ? 0.0F : least;
+    }
+  });
 }
 
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds) {

@@ -103,7 +103,7 @@ class TwoNearest {
   void left_by_others(const Ground& ground, std::size_t model, std::vector<float>& caps) const;
 
  private:
-  void meet(std::uint32_t model, std::span<const float> distances);
+  void meet(std::uint32_t model, std::span<const float> distances, std::size_t first, std::size_t last);
 
   std::vector<float> nearest_, next_;  // NaN where a point is not finite
   std::vector<std::uint32_t> whose_;   // the nearest

@@ -186,13 +186,11 @@ Expected<> Worth::choose(const Swarm& swarm, Candidate& candidate) const {
   }
   const auto distances = measure(problem_.part_ground, known);
   if (!distances) return tl::unexpected(distances.error());
-  double most = 0;
-  for (std::size_t m = 0; m < known.size(); ++m) {
-    const double now = saving_along(candidate.kind, known[m].theta, (*distances)[m]);
-    if (!(now > most)) continue;
-    most = now;
-    candidate.theta = known[m].theta;
-  }
+  std::vector<double> savings(known.size());
+  problem_.evaluator.share_out(known.size(),
+                               [&](std::size_t m) { savings[m] = saving_along(candidate.kind, known[m].theta, (*distances)[m]); });
+  const auto most = std::max_element(savings.begin(), savings.end());
+  if (*most > 0) candidate.theta = known[static_cast<std::size_t>(most - savings.begin())].theta;
   return {};
 }
 
