@@ -57,7 +57,7 @@ void for_runs(std::size_t count, kernels::FitnessEvaluator* workers, Body&& body
 /// Places of the `count` candidates nearest to each, one after the other.
 template <std::size_t D>
 std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
-                                           kernels::FitnessEvaluator* workers) {
+                                           kernels::FitnessEvaluator* workers, std::span<const std::uint8_t> asked) {
   constexpr std::size_t kLeaf = 24;  // points that are looked at one after the other
   Rows<D> rows;
   rows.values.reserve(candidates.size() * D);
@@ -71,6 +71,10 @@ std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::spa
     std::vector<float> square(count + 1);
     std::vector<std::pair<float, std::uint32_t>> sorted;
     for (std::size_t c = first; c < last; ++c) {
+      if (!asked.empty() && asked[c] == 0) {
+        std::fill_n(nearest.begin() + static_cast<std::ptrdiff_t>(c * count), count, static_cast<std::uint32_t>(c));
+        continue;
+      }
       const std::size_t found = tree.knnSearch(&rows.values[c * D], count + 1, place.data(), square.data());
       sorted.clear();
       for (std::size_t k = 0; k < found; ++k) {
@@ -86,22 +90,25 @@ std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::spa
 }  // namespace
 
 Neighbours::Neighbours(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
-                       kernels::FitnessEvaluator* workers) {
+                       kernels::FitnessEvaluator* workers, std::span<const std::uint8_t> asked) {
   count_ = candidates.empty() ? 0 : std::min(count, candidates.size() - 1);
   if (count_ == 0) return;
   switch (points.dimension()) {
-    case 2: nearest_ = nearest_of_each<2>(points, candidates, count_, workers); return;
-    case 3: nearest_ = nearest_of_each<3>(points, candidates, count_, workers); return;
-    default: nearest_ = nearest_of_each<4>(points, candidates, count_, workers);
+    case 2: nearest_ = nearest_of_each<2>(points, candidates, count_, workers, asked); return;
+    case 3: nearest_ = nearest_of_each<3>(points, candidates, count_, workers, asked); return;
+    default: nearest_ = nearest_of_each<4>(points, candidates, count_, workers, asked);
   }
 }
 
 std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates,
-                                              const Neighbours& neighbours, kernels::FitnessEvaluator* workers) {
+                                              const Neighbours& neighbours, kernels::FitnessEvaluator* workers,
+                                              std::span<const std::uint8_t> asked) {
   std::vector<Eigen::Vector3f> normals(candidates.size(), Eigen::Vector3f::Zero());
   if (neighbours.empty()) return normals;
   for_runs(candidates.size(), workers, [&](std::size_t first, std::size_t last) {
-    for (std::size_t c = first; c < last; ++c) normals[c] = normal_of(points, candidates, candidates[c], neighbours.of(c));
+    for (std::size_t c = first; c < last; ++c) {
+      if (asked.empty() || asked[c] != 0) normals[c] = normal_of(points, candidates, candidates[c], neighbours.of(c));
+    }
   });
   return normals;
 }

@@ -16,9 +16,10 @@ class Neighbours {
  public:
   Neighbours() = default;
   /// `candidates`: input indices of finite points. `count`: neighbours a point, fewer where there are fewer candidates. `workers`, here and
-  /// below, may be null: whose threads share the work.
+  /// below, may be null: whose threads share the work. `asked`: not 0 where a candidate's neighbours are looked up; one that is not asked
+  /// for is given itself. Empty: all are.
   Neighbours(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
-             kernels::FitnessEvaluator* workers = nullptr);
+             kernels::FitnessEvaluator* workers = nullptr, std::span<const std::uint8_t> asked = {});
 
   bool empty() const noexcept { return nearest_.empty(); }
   std::size_t count() const noexcept { return count_; }
@@ -30,8 +31,10 @@ class Neighbours {
   std::vector<std::uint32_t> nearest_;
 };
 
-/// Unit normals of points in space, one a candidate: of the plane through it and its neighbours; zero where those have no one plane.
+/// Unit normals of points in space, one a candidate: of the plane through it and its neighbours; zero where those have no one plane, and of
+/// those that are not `asked` for.
 std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::span<const std::uint32_t> candidates,
-                                              const Neighbours& neighbours, kernels::FitnessEvaluator* workers = nullptr);
+                                              const Neighbours& neighbours, kernels::FitnessEvaluator* workers = nullptr,
+                                              std::span<const std::uint8_t> asked = {});
 
 }  // namespace swarmfit::models

@@ -231,7 +231,10 @@ Expected<FitCall::Found> FitCall::search(const std::vector<Model>& warm_start, F
   MultiModel search(evaluator_, kinds_, working(), *part_, options_.seed, limits_, spread_);
   search.watched_by(watch());
   if (points_set_) search.points_are_set();
-  if (looks_later()) search.learn_when_needed([&] { learn_neighbourhoods(*part_, working(), keenest(kinds_), &evaluator_); });
+  if (looks_later()) {
+    search.learn_when_needed(
+        [&](std::span<const float> left) { learn_neighbourhoods(*part_, working(), keenest(kinds_), &evaluator_, left); });
+  }
   if (auto done = search.run(on_model_, warm_start, result, known_); !done) return tl::unexpected(done.error());
   return found_by(search);
 }

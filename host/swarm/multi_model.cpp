@@ -50,7 +50,7 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
   }
   if (learn_) {
     if (auto done = take_planes_that_stand_out(seeds, on_model, result); !done) return done;
-    learn_();
+    learn_(left_.part_caps());
   }
   if (auto done = look_round_by_round(seeds, on_model, result); !done) return done;
   result.stop_reason = pilot_.why_ended();

@@ -33,9 +33,9 @@ class MultiModel {
   /// The evaluator has the points of this search already, from one before: setting them again would but sort them anew.
   void points_are_set() noexcept { points_set_ = true; }
 
-  /// `learn` tells the neighbourhoods of the part and the points' normals, which were not known so far. Planes that stand out are taken
-  /// before it is called.
-  void learn_when_needed(std::function<void()> learn) { learn_ = std::move(learn); }
+  /// `learn` tells the neighbourhoods and normals of those of the part's points of which something is left; none were known so far. Planes
+  /// that stand out are taken before it is called.
+  void learn_when_needed(std::function<void(std::span<const float> left)> learn) { learn_ = std::move(learn); }
 
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
   /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.
@@ -100,7 +100,7 @@ class MultiModel {
   Search search_;
   Contest contest_;
   Polish polish_;
-  std::function<void()> learn_;
+  std::function<void(std::span<const float>)> learn_;
   std::unique_ptr<ShareOut> share_out_;  // where the joint end of correspondences has begun
   std::vector<models::Placed> found_, hidden_;
   std::vector<std::uint16_t> labels_;

@@ -204,12 +204,17 @@ Part part_to_look_at(const models::WorkingPoints& points, const Random& random, 
   return {Subset(points, drawn, workers), {}};
 }
 
-void learn_neighbourhoods(Part& part, models::WorkingPoints& points, const models::ModelSpace& space, kernels::FitnessEvaluator* workers) {
+void learn_neighbourhoods(Part& part, models::WorkingPoints& points, const models::ModelSpace& space, kernels::FitnessEvaluator* workers,
+                          std::span<const float> left) {
   constexpr std::size_t kNeighbours = 16;
   const bool correspondences = points.dimension() > 3;
-  if (correspondences || space.agrees_by_normals()) part.neighbours = models::Neighbours(points, part.points.index(), kNeighbours, workers);
+  if (!correspondences && !space.agrees_by_normals()) return;
+  const std::span<const std::uint32_t> index = part.points.index();
+  std::vector<std::uint8_t> asked(left.size());
+  std::transform(left.begin(), left.end(), asked.begin(), [](float cap) -> std::uint8_t { return cap > 0 ? 1 : 0; });
+  part.neighbours = models::Neighbours(points, index, kNeighbours, workers, asked);
   if (!space.agrees_by_normals()) return;
-  const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, part.points.index(), part.neighbours, workers);
+  const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, index, part.neighbours, workers, asked);
   std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
   for (std::size_t k = 0; k < known.size(); ++k) normals[part.points.index()[k]] = known[k];
   points.set_normals(std::move(normals));
