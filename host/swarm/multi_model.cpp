@@ -63,20 +63,21 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
 }
 
 Expected<> MultiModel::take_planes_that_stand_out(const Seeds& seeds, const ModelCallback& on_model, FitResult& result) {
-  Candidate plane;
-  while (plane.kind < problem_.asked && problem_.space(plane.kind).type() != ModelType::plane) ++plane.kind;
-  if (plane.kind == problem_.asked || problem_.settings.deflation != Deflation::residual) return {};
+  std::size_t plane = 0;
+  while (plane < problem_.kinds.size() && problem_.space(plane).type() != ModelType::plane) ++plane;
+  if (plane == problem_.kinds.size() || problem_.settings.deflation != Deflation::residual) return {};
+  const bool hidden = problem_.kinds[plane].hidden;
   const Worth worth(problem_, left_);
   const double much = kStandsOut * static_cast<double>(problem_.points.finite_count());
   while (pilot_.why_ended().empty() && !full()) {
     Candidate candidate;
-    candidate.kind = plane.kind;
+    candidate.kind = plane;
     pilot_.set_steps(0);
-    auto outcome = search_.explore(pilot_.next_round(), seeds[plane.kind], candidate);
+    auto outcome = search_.explore(pilot_.next_round(), seeds[plane], candidate);
     if (!outcome) return tl::unexpected(outcome.error());
     if (*outcome == Outcome::interrupted && !pilot_.interrupted()) pilot_.go_on();  // what is left may yet determine another kind
     if (*outcome != Outcome::found || static_cast<double>(candidate.support.inliers()) < much || !worth.lies_flat(candidate)) return {};
-    if (auto done = take_found(candidate, on_model, result); !done) return done;
+    if (auto done = take(candidate, hidden ? Outcome::flat : Outcome::found, on_model, result); !done) return done;
   }
   return {};
 }

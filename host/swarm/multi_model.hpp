@@ -67,8 +67,8 @@ class MultiModel {
 
   /// Gives the evaluator what it is to know.
   Expected<> prepare();
-  /// Of several kinds with the plane among them: planes that hold much of the cloud and lie flat. Nothing else explains their points, so
-  /// that there is no need to look at other kinds, nor at normals, before them.
+  /// Of several kinds with the plane among them, be it a hidden one: planes that hold much of the cloud and lie flat. Nothing else explains
+  /// their points, so that there is no need to look at other kinds, nor at normals, before them.
   Expected<> take_planes_that_stand_out(const Seeds& seeds, const ModelCallback& on_model, FitResult& result);
   /// One round after another until none finds anything.
   Expected<> look_round_by_round(const Seeds& seeds, const ModelCallback& on_model, FitResult& result);
