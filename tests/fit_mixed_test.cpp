@@ -310,8 +310,11 @@ TEST_P(FitMixed, AnOutlineDoesNotWidenWhatItSurrounds) {
 }
 
 TEST_P(FitMixed, ThePlaneThatStandsOutIsToldFirst) {
+  // The barrel has more points, and would be found first.
   const auto seed = static_cast<std::uint64_t>(GetParam());
-  const Scene scene = table_scene(seed + 1100);
+  Scene scene(seed + 1100);
+  scene.table(5000);
+  scene.cylinder(Vector(0, 0, 0.01), 0.2, 0.5, 9000, 2);
   std::vector<ModelType> told_of;
   const auto result =
       fit(scene.points(), options_for({ModelType::cylinder, ModelType::sphere, ModelType::plane}, seed), [&](const Model& model) {
@@ -333,7 +336,6 @@ TEST_P(FitMixed, WhatIsBentIsNoPlaneThatStandsOut) {
   scene.outliers(500);
   const auto result = fit(scene.points(), options_for({ModelType::plane, ModelType::cylinder}, seed));
   ASSERT_TRUE(result) << result.error().message;
-  EXPECT_EQ(result->models[0].type, ModelType::cylinder) << told(*result);
   expect_radii(*result, ModelType::cylinder, std::array{0.15});
   EXPECT_TRUE(radii(*result, ModelType::plane).empty()) << told(*result);
 }

@@ -430,6 +430,37 @@ TEST(NoiseScale, GaussianPartAmongUniformBackground) {
   EXPECT_EQ(gaussian_part({}, 0.1, 0.3), 0);
 }
 
+TEST(Subset, NeighbourhoodsAreThoseOfPointsThatSomethingIsLeftOf) {
+  const Random random(3);
+  std::vector<float> rows;
+  for (std::uint32_t i = 0; i < 2000; ++i) {
+    const auto w = random.words(Draw::subset, 7, 0, i);
+    const double turn = 6.283 * Random::unit(w[0]);
+    for (const double x : {std::cos(turn), std::sin(turn), 2 * Random::unit(w[1])}) rows.push_back(static_cast<float>(x));
+  }
+  models::WorkingPoints points{PointsView(std::span<const float>(rows), 3)}, all_of_them = points;
+  const auto space = models::make_space(ModelType::cylinder, {});
+  Part part = part_to_look_at(points, random, 600);
+  ASSERT_TRUE(part.neighbours.empty());
+  std::vector<float> left(part.points.index().size());
+  for (std::size_t k = 0; k < left.size(); ++k) left[k] = k % 3 == 0 ? 0.0F : 0.01F;
+  learn_neighbourhoods(part, points, *space, nullptr, left);
+  const Part whole = look_closely(all_of_them, *space, random, 600);
+  for (std::size_t k = 0; k < left.size(); ++k) {
+    const std::uint32_t i = part.points.index()[k];
+    ASSERT_EQ(whole.points.index()[k], i);
+    const auto near = part.neighbours.of(k), expected = whole.neighbours.of(k);
+    if (left[k] > 0) {
+      EXPECT_TRUE(std::equal(near.begin(), near.end(), expected.begin(), expected.end()));
+      EXPECT_EQ(points.normal(i), all_of_them.normal(i));
+      EXPECT_FALSE(points.normal(i).isZero());
+    } else {
+      EXPECT_TRUE(std::all_of(near.begin(), near.end(), [&](std::uint32_t place) { return place == k; }));
+      EXPECT_TRUE(points.normal(i).isZero());
+    }
+  }
+}
+
 TEST(Subset, CoversEvenlyAndKeepsNeighboursTogether) {
   const std::vector<double> rows = slab(5000, 0.01);
   const models::WorkingPoints points(PointsView(std::span<const double>(rows), 3));

@@ -12,7 +12,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
-constexpr int kCurvedRounds = 4;  // of refinement on a part: each runs Gauss-Newton to its end, and one on all points follows
+constexpr int kCurvedRounds = 4;                    // of refinement on a part: each takes Gauss-Newton steps, and one on all points follows
 
 }  // namespace
 

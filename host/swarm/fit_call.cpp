@@ -232,7 +232,7 @@ Expected<FitCall::Found> FitCall::search(const std::vector<Model>& warm_start, F
   search.watched_by(watch());
   if (points_set_) search.points_are_set();
   if (looks_later()) {
-    search.learn_when_needed(
+    search.learn_after_planes(
         [&](std::span<const float> left) { learn_neighbourhoods(*part_, working(), keenest(kinds_), &evaluator_, left); });
   }
   if (auto done = search.run(on_model_, warm_start, result, known_); !done) return tl::unexpected(done.error());

@@ -50,7 +50,7 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
   }
   if (learn_) {
     if (auto done = take_planes_that_stand_out(seeds, on_model, result); !done) return done;
-    learn_(left_.part_caps());
+    if (pilot_.why_ended().empty() && !pilot_.interrupted() && !full()) learn_(left_.part_caps());
   }
   if (auto done = look_round_by_round(seeds, on_model, result); !done) return done;
   result.stop_reason = pilot_.why_ended();
@@ -65,7 +65,7 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
 Expected<> MultiModel::take_planes_that_stand_out(const Seeds& seeds, const ModelCallback& on_model, FitResult& result) {
   std::size_t plane = 0;
   while (plane < problem_.kinds.size() && problem_.space(plane).type() != ModelType::plane) ++plane;
-  if (plane == problem_.kinds.size() || problem_.settings.deflation != Deflation::residual) return {};
+  if (plane == problem_.kinds.size() || !problem_.allowed.empty()) return {};  // where each point has a threshold none is known to lie flat
   const bool hidden = problem_.kinds[plane].hidden;
   const Worth worth(problem_, left_);
   const double much = kStandsOut * static_cast<double>(problem_.points.finite_count());

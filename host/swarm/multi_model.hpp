@@ -35,7 +35,7 @@ class MultiModel {
 
   /// `learn` tells the neighbourhoods and normals of those of the part's points of which something is left; none were known so far. Planes
   /// that stand out are taken before it is called.
-  void learn_when_needed(std::function<void(std::span<const float> left)> learn) { learn_ = std::move(learn); }
+  void learn_after_planes(std::function<void(std::span<const float> left)> learn) { learn_ = std::move(learn); }
 
   /// Fills models, as far as these points tell, stop_reason and the counts of the result. The rest is for settle(). `known` are refined
   /// and taken, where they pay, before anything is searched; `warm_start` only tells the first swarms where to begin.

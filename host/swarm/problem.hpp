@@ -1,4 +1,5 @@
-// What one search is over: kinds of model, points, and what follows from these. Nothing here changes while it runs.
+// What one search is over: kinds of model, points, and what follows from these. Nothing here changes while it runs, but that neighbours and
+// normals may be learnt once, before the first swarm that asks for them.
 #pragma once
 
 #include <cstddef>

@@ -205,9 +205,6 @@ void TwoNearest::meet(std::uint32_t model, std::span<const float> distances, std
     nearest_[i] = closer ? d : nearest;
     whose_[i] = closer ? model : whose_[i];
   }
-  if (model > 0) return;
-  // One pass is enough to tell.
-  for (std::size_t i = first; i < last; ++i) nearest_[i] = std::isnan(distances[i]) ? distances[i] : nearest_[i];
 }
 
 void TwoNearest::left_by_others(const Ground& ground, std::size_t model, std::vector<float>& caps) const {
@@ -215,7 +212,7 @@ void TwoNearest::left_by_others(const Ground& ground, std::size_t model, std::ve
     for (std::size_t i = first; i < last; ++i) {
       const float left = whose_[i] == model ? next_[i] : nearest_[i], allowed = ground.allowed_at(i);
       const float least = left < allowed ? left : allowed;
-      caps[i] = std::isnan(nearest_[i]) ? 0.0F : least;
+      caps[i] = ground.points.finite(ground.index(i)) ? least : 0.0F;
     }
   });
 }

@@ -105,7 +105,7 @@ class TwoNearest {
  private:
   void meet(std::uint32_t model, std::span<const float> distances, std::size_t first, std::size_t last);
 
-  std::vector<float> nearest_, next_;  // NaN where a point is not finite
+  std::vector<float> nearest_, next_;  // infinite where a point is not finite
   std::vector<std::uint32_t> whose_;   // the nearest
 };
 

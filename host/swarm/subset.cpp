@@ -75,8 +75,8 @@ std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, 
 std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part,
                                            kernels::FitnessEvaluator* workers) {
   constexpr int kCellBits = 16;  // of a column
-  // Points of a part of the cloud are farther apart, and two digits, or four, tell them apart as well.
-  constexpr int kPartCellBits = 11, kPartCellBitsOf3 = 7;
+  // Points of a part of the cloud are farther apart: three digits tell them apart as well, also where some are far from all others.
+  constexpr int kPartCellBits = 11, kPartCellBitsOf3 = 10;
   const bool all = part.size() == points.finite_count();
   switch (points.dimension()) {
     case 2:

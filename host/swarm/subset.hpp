@@ -73,8 +73,8 @@ struct Part {
 /// A part of `size` points at most, its neighbourhoods not known yet. `spread` is empty or as for draw_steady_part().
 Part part_to_look_at(const models::WorkingPoints& points, const Random& random, std::size_t size,
                      kernels::FitnessEvaluator* workers = nullptr, std::span<const float> spread = {});
-/// Its neighbourhoods, where the kind has use for them; gives `points` the normals of the part where the kind looks at them. `left`: what is
-/// left of each of the part's points; those of which nothing is are left out. Empty: none are.
+/// Its neighbourhoods, where the kind has use for them; gives `points` the normals of the part where the kind looks at them. `left`: what
+/// is left of each of the part's points; those of which nothing is are left out. Empty: none are.
 void learn_neighbourhoods(Part& part, models::WorkingPoints& points, const models::ModelSpace& space,
                           kernels::FitnessEvaluator* workers = nullptr, std::span<const float> left = {});
 /// Both.

@@ -20,6 +20,7 @@ constexpr double kThin = 6;            // tau: a cylinder that is wider lies abo
 constexpr std::size_t kNext = 4;       // nearest neighbours of a point along it that are asked how far off they are
 constexpr double kEven = 0.8;          // von Neumann's ratio: below, they are off to the same side
 constexpr double kBent = 0.15;         // tau: root mean square of how far a plane's points bend away from it: below, they lie flat,
+constexpr std::size_t kFewest = 32;    // of these: fewer bend by chance, or not,
 constexpr double kGoesOn = 0.1;        // unless so many times as many are right beside it: the surface goes on there, bent
 
 /// How many of a model's points lie along it, of those whose surface is known; one is added so that no points are no cause for doubt.
@@ -112,7 +113,8 @@ bool Worth::lies_flat(const Candidate& candidate) const {
     own.emplace_back(at.dot(x), at.dot(y), at.dot(normal));
     mean += own.back();
   }
-  const double count = std::max(1.0, static_cast<double>(own.size()));
+  if (own.size() < kFewest) return false;
+  const auto count = static_cast<double>(own.size());
   mean /= count;
   Eigen::Vector3d square = Eigen::Vector3d::Constant(1e-300);
   for (Eigen::Vector3d& at : own) {

@@ -16,6 +16,8 @@
 #include <immintrin.h>
 #endif
 
+#include "kernels/cpu/wake_elsewhere.hpp"
+
 namespace swarmfit::kernels::cpu {
 namespace {
 
@@ -51,6 +53,7 @@ struct Crew::Shared {
     std::size_t end = 0;
     std::atomic_flag taken;                 ///< a helper is this member
     std::atomic<ThreadNumber> sleeper = 0;  ///< the thread that was, since it went and until it comes again, as whatever member
+    ThreadNumber kept_off = 0;              ///< a sleeper that the caller has woken elsewhere, while it is at work
   };
   std::vector<Share> shares;  ///< a member; the caller's first
 
@@ -98,16 +101,19 @@ struct Crew::Shared {
     return member;
   }
 
-  void wake_up() noexcept {
+  /// The calling thread sleeps no longer, and may go where it likes.
+  void is_awake() noexcept {
+    const ThreadNumber own = this_thread();
+    let_roam(own);
     for (Share& share : shares) {
-      ThreadNumber mine = this_thread();
-      share.sleeper.compare_exchange_strong(mine, 0, std::memory_order_relaxed);
+      ThreadNumber expected = own;
+      share.sleeper.compare_exchange_strong(expected, 0, std::memory_order_relaxed);
     }
   }
 
   /// Helps with what there is and what comes, and goes when nothing has come for a while.
   void help() {
-    wake_up();
+    is_awake();
     const std::size_t own = become_member();
     std::uint64_t done = 0;
     auto since = Clock::now();
@@ -150,7 +156,6 @@ class Crew::Arena {
 Crew::Crew(int threads)
     : helpers_(threads - 1),
       shared_(std::make_shared<Shared>(static_cast<std::size_t>(threads))),
-      elsewhere_(static_cast<std::size_t>(helpers_)),
       arena_(threads > 1 ? std::make_unique<Arena>(threads) : nullptr) {
   if (arena_) call_helpers(static_cast<std::size_t>(helpers_));
 }
@@ -167,8 +172,14 @@ Crew::~Crew() {
 
 void Crew::call_helpers(std::size_t wanted) {
   const int most = static_cast<int>(std::min(wanted, static_cast<std::size_t>(helpers_)));
-  if (shared_->awake.load(std::memory_order_relaxed) >= most) return;
-  for (const Shared::Share& share : shared_->shares) elsewhere_.keep_off(share.sleeper.load(std::memory_order_relaxed));
+  int missing = most - shared_->awake.load(std::memory_order_relaxed);
+  for (Shared::Share& share : shared_->shares) {
+    if (missing <= 0) break;
+    const ThreadNumber sleeper = share.sleeper.load(std::memory_order_relaxed);
+    if (sleeper == 0) continue;
+    if (keep_off_this_processor(sleeper)) share.kept_off = sleeper;
+    --missing;
+  }
   while (shared_->awake.load(std::memory_order_relaxed) < most) {
     shared_->awake.fetch_add(1);
     try {
@@ -200,7 +211,7 @@ void Crew::run(std::size_t tasks, const Work& work, void* context) {
     breathe();
     if (looks > kLooks) std::this_thread::yield();
   }
-  elsewhere_.let_roam();
+  for (Shared::Share& share : shared.shares) let_roam(std::exchange(share.kept_off, 0));  // those that have not come yet
   if (shared.failed.test()) std::rethrow_exception(std::exchange(shared.failure, nullptr));
 }
 

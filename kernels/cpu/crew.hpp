@@ -4,13 +4,12 @@
 #include <cstddef>
 #include <memory>
 
-#include "kernels/cpu/wake_elsewhere.hpp"
-
 namespace swarmfit::kernels::cpu {
 
 /// Tasks on oneTBB's threads, begun within a microsecond. A thread that TBB has sent to sleep takes tens of them to wake, as long as one
-/// step of a swarm takes; so those that helped once look for more for a short while before they go. The caller works along and waits for
-/// nobody who has not begun. One thread at a time may call.
+/// step of a swarm takes; so those that helped once look for more for a short while before they go. One that has gone is woken on another
+/// processor than the caller's (wake_elsewhere.hpp). The caller works along and waits for nobody who has not begun. One thread at a time
+/// may call.
 class Crew {
  public:
   /// threads >= 1, the caller's among them.
@@ -38,7 +37,6 @@ class Crew {
 
   int helpers_;
   std::shared_ptr<Shared> shared_;
-  WakeElsewhere elsewhere_;
   std::unique_ptr<Arena> arena_;
 };
 

@@ -1,8 +1,7 @@
-// Where a thread that slept wakes up.
+// Where a thread that slept wakes up. In a virtual machine Linux takes a processor that has long had nothing to do for one that the
+// host has taken away, and wakes a thread on the waker's own, where it waits for the waker's time slice to end: one to three
+// milliseconds, as long as a fit. So the thread is kept off that processor until it is awake.
 #pragma once
-
-#include <cstddef>
-#include <vector>
 
 namespace swarmfit::kernels::cpu {
 
@@ -12,28 +11,12 @@ using ThreadNumber = int;
 /// The caller's own; 0 where the system does not tell.
 ThreadNumber this_thread() noexcept;
 
-/// Keeps threads that are about to be woken off the processor of who wakes them. In a virtual machine Linux takes a processor that has
-/// long had nothing to do for one that the host has taken away, and wakes a thread on the waker's own, where it waits for the waker's time
-/// slice to end: one to three milliseconds, as long as a fit. Elsewhere this changes nothing; on other systems than Linux it does nothing.
-class WakeElsewhere {
- public:
-  /// Room for so many threads.
-  explicit WakeElsewhere(std::size_t threads) { kept_off_.reserve(threads); }
-  ~WakeElsewhere() { let_roam(); }
-  WakeElsewhere(const WakeElsewhere&) = delete;
-  WakeElsewhere& operator=(const WakeElsewhere&) = delete;
+/// From now on the thread runs on any of its processors but the caller's; false where it does as before: if it has no other, is kept off
+/// one already or is no more; on a machine of its own, on other systems than Linux, and in a process that was forked, whose threads they
+/// are not. A thread that was kept off once has an affinity of its own from then on: that which it had.
+bool keep_off_this_processor(ThreadNumber thread) noexcept;
 
-  /// The thread wakes on any of its processors but the caller's, unless it has no other, there is no room or it is no more.
-  void keep_off(ThreadNumber thread) noexcept;
-  /// Those that were kept off may run where they might before.
-  void let_roam() noexcept;
-
- private:
-  struct KeptOff {
-    ThreadNumber thread;
-    int processor;
-  };
-  std::vector<KeptOff> kept_off_;
-};
+/// A thread that was kept off runs where it might before, unless somebody has chosen otherwise meanwhile. From any thread, itself included.
+void let_roam(ThreadNumber thread) noexcept;
 
 }  // namespace swarmfit::kernels::cpu
