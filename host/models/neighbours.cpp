@@ -6,6 +6,8 @@
 #include <Eigen/Dense>
 #include <nanoflann.hpp>
 
+#include "host/common/ranges.hpp"
+
 namespace swarmfit::models {
 namespace {
 
@@ -46,13 +48,8 @@ Eigen::Vector3f normal_of(const WorkingPoints& points, std::span<const std::uint
   return solver.eigenvectors().col(0).cast<float>();
 }
 
-/// body(first, last) for runs of `count` places.
-template <class Body>
-void for_runs(std::size_t count, kernels::FitnessEvaluator* workers, Body&& body) {
-  constexpr std::size_t kRun = 64, kWorthWaking = 1024;
-  if (workers == nullptr || count <= kWorthWaking) return body(std::size_t{0}, count);
-  workers->share_out((count + kRun - 1) / kRun, [&](std::size_t run) { body(run * kRun, std::min(count, (run + 1) * kRun)); });
-}
+// Places that a thread takes at a time, and how many are not worth waking one for.
+constexpr std::size_t kRun = 64, kFew = 1024;
 
 /// Places of the `count` candidates nearest to each, one after the other.
 template <std::size_t D>
@@ -66,7 +63,7 @@ std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::spa
   }
   const Tree<D> tree(static_cast<int>(D), rows, nanoflann::KDTreeSingleIndexAdaptorParams(kLeaf));
   std::vector<std::uint32_t> nearest(candidates.size() * count);
-  for_runs(candidates.size(), workers, [&](std::size_t first, std::size_t last) {
+  common::in_ranges(workers, candidates.size(), kRun, kFew, [&](std::size_t first, std::size_t last) {
     std::vector<std::uint32_t> place(count + 1);
     std::vector<float> square(count + 1);
     std::vector<std::pair<float, std::uint32_t>> sorted;
@@ -105,7 +102,7 @@ std::vector<Eigen::Vector3f> estimate_normals(const WorkingPoints& points, std::
                                               std::span<const std::uint8_t> asked) {
   std::vector<Eigen::Vector3f> normals(candidates.size(), Eigen::Vector3f::Zero());
   if (neighbours.empty()) return normals;
-  for_runs(candidates.size(), workers, [&](std::size_t first, std::size_t last) {
+  common::in_ranges(workers, candidates.size(), kRun, kFew, [&](std::size_t first, std::size_t last) {
     for (std::size_t c = first; c < last; ++c) {
       if (asked.empty() || asked[c] != 0) normals[c] = normal_of(points, candidates, candidates[c], neighbours.of(c));
     }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/common/ranges.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
@@ -169,13 +171,11 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
 
 namespace {
 
-/// some(first, last) for ranges that together make up [0, count), on the threads that share the ground's work.
+/// Of points that take a nanosecond each.
 template <class Some>
 void in_ranges(const Ground& ground, std::size_t count, Some&& some) {
-  constexpr std::size_t kRange = 16384;  // of points that take a nanosecond each
-  const std::size_t ranges = (count + kRange - 1) / kRange;
-  if (ranges <= 1) return some(std::size_t{0}, count);
-  ground.evaluator.share_out(ranges, [&](std::size_t k) { some(k * kRange, std::min(count, (k + 1) * kRange)); });
+  constexpr std::size_t kRange = 16384;
+  common::in_ranges(&ground.evaluator, count, kRange, kRange, some);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <numeric>
 
+#include "host/common/ranges.hpp"
 #include "kernels/bit_spread.hpp"
 
 namespace swarmfit::swarm {
@@ -50,12 +51,11 @@ void sort_by_code(std::vector<Coded<Code>>& coded, int bits) {
   coded.size() < kFew ? sort_by_digits<8>(coded, bits) : sort_by_digits<11>(coded, bits);
 }
 
-/// some(first, last) for ranges of a length that is a multiple of 64 and together make up [0, count).
+/// Of what takes a thread some nanoseconds each: a multiple of 64 of them are taken at a time.
 template <class Some>
 void share(kernels::FitnessEvaluator* workers, std::size_t count, Some&& some) {
-  constexpr std::size_t kRange = 3072, kWorthwhile = 4096;  // of what takes a thread some nanoseconds each
-  if (workers == nullptr || count < kWorthwhile) return some(std::size_t{0}, count);
-  workers->share_out((count + kRange - 1) / kRange, [&](std::size_t k) { some(k * kRange, std::min(count, (k + 1) * kRange)); });
+  constexpr std::size_t kRange = 3072, kFew = 4095;
+  common::in_ranges(workers, count, kRange, kFew, some);
 }
 
 template <std::size_t D, class Code>
