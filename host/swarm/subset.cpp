@@ -79,9 +79,7 @@ std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, 
   constexpr int kPartCellBits = 11, kPartCellBitsOf3 = 10;
   const bool all = part.size() == points.finite_count();
   switch (points.dimension()) {
-    case 2:
-      return all ? in_morton_order<2, std::uint32_t>(points, part, kCellBits, workers)
-                 : in_morton_order<2, std::uint32_t>(points, part, kPartCellBits, workers);
+    case 2: return in_morton_order<2, std::uint32_t>(points, part, all ? kCellBits : kPartCellBits, workers);
     case 3:
       return all ? in_morton_order<3, std::uint64_t>(points, part, kCellBits, workers)
                  : in_morton_order<3, std::uint32_t>(points, part, kPartCellBitsOf3, workers);
