@@ -226,12 +226,16 @@ TEST(StereoPlanes, ASlabThroughClutterIsNone) {
 }
 
 // The true vertical is that of the level surfaces in the ground truth's normals.
+constexpr std::size_t kSeeds = 8;
+struct Level {
+  Eigen::Vector3d at;          // [m] a point amid it: what the ground truth has there is level
+  std::size_t seeds = kSeeds;  // that must find it
+};
 struct Pair {
   const char* name;
   Eigen::Vector3d up;
-  double within;                          // [degrees]
-  std::vector<Eigen::Vector3d> supports;  // [m] a point amid each: what the ground truth has there is level
-  std::size_t seeds = 8;                  // of eight that must find each
+  double within;  // [degrees]
+  std::vector<Level> supports;
 };
 
 class StereoPairs : public testing::TestWithParam<Pair> {};
@@ -242,7 +246,6 @@ TEST_P(StereoPairs, VerticalAndSupports) {
   const auto folder = std::filesystem::path(data) / "middlebury" / GetParam().name;
   const auto frame = read_stereo(folder / "im0.png", folder / "im1.png", folder / "calib.txt");
   if (!frame) GTEST_SKIP() << frame.error().message;
-  constexpr std::size_t kSeeds = 8;
   std::vector<std::size_t> times(GetParam().supports.size());
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
     PerceiveOptions options;
@@ -254,22 +257,24 @@ TEST_P(StereoPairs, VerticalAndSupports) {
     EXPECT_LT(degrees_between(result->up, GetParam().up), GetParam().within) << "seed " << seed;
     for (std::size_t k = 0; k < times.size(); ++k) {
       const auto carries = [&](const Model& m) {
-        return m.supporting && std::abs(m.normal().dot(GetParam().supports[k]) + m.offset()) < 0.02;
+        return m.supporting && std::abs(m.normal().dot(GetParam().supports[k].at) + m.offset()) < 0.02;
       };
       times[k] += std::any_of(result->fit.models.begin(), result->fit.models.end(), carries) ? 1 : 0;
     }
   }
   for (std::size_t k = 0; k < times.size(); ++k) {
-    EXPECT_GE(times[k], GetParam().seeds) << "of " << kSeeds << " seeds with a support at " << GetParam().supports[k].transpose() << " m";
+    const Level& level = GetParam().supports[k];
+    EXPECT_GE(times[k], level.seeds) << "of " << kSeeds << " seeds with a support at " << level.at.transpose() << " m";
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Middlebury, StereoPairs,
-    testing::Values(Pair{"Shelves", {0.002, -0.979, 0.202}, 4, {{0.331, -0.474, 3.07}, {-0.158, -0.157, 3.201}}},
-                    Pair{"Playtable", {-0.004, -0.839, -0.544}, 0.5, {{0.053, 0.406, 1.72}, {0.159, -0.151, 1.577}, {0.485, 0.098, 1.565}}},
-                    // Two of its levels are three thresholds apart, and one seed in five takes them for one.
-                    Pair{"Adirondack", {-0.015, -0.923, -0.384}, 5, {{-0.282, 0.095, 1.961}, {-0.053, 0.167, 2.062}}, 5}),
+    testing::Values(
+        Pair{"Shelves", {0.002, -0.979, 0.202}, 4, {{{0.331, -0.474, 3.07}}, {{-0.158, -0.157, 3.201}}}},
+        Pair{"Playtable", {-0.004, -0.839, -0.544}, 0.5, {{{0.053, 0.406, 1.72}}, {{0.159, -0.151, 1.577}}, {{0.485, 0.098, 1.565}}}},
+        // The last is three thresholds from another level, and one seed in five takes them for one.
+        Pair{"Adirondack", {-0.015, -0.923, -0.384}, 5, {{{-0.282, 0.095, 1.961}}, {{-0.053, 0.167, 2.062}, 5}}}),
     [](const auto& pair) { return std::string(pair.param.name); });
 
 }  // namespace

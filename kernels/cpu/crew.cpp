@@ -211,7 +211,9 @@ void Crew::run(std::size_t tasks, const Work& work, void* context) {
     breathe();
     if (looks > kLooks) std::this_thread::yield();
   }
-  for (Shared::Share& share : shared.shares) let_roam(std::exchange(share.kept_off, 0));  // those that have not come yet
+  for (Shared::Share& share : shared.shares) {
+    if (share.kept_off != 0) let_roam(std::exchange(share.kept_off, 0));  // it may not have come yet
+  }
   if (shared.failed.test()) std::rethrow_exception(std::exchange(shared.failure, nullptr));
 }
 
