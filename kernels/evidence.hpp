@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "kernels/models/models.hpp"
 #include "kernels/points_view.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::kernels {
 
@@ -25,8 +25,8 @@ struct Moments {
 /// Which points of a cloud are finite, and how these lie.
 struct Survey {
   std::size_t finite_count = 0;
-  std::vector<std::uint64_t> finite;  ///< a bit a point: bit i % 64 of word i / 64
-  Moments moments;                    ///< of the finite points, each of weight 1
+  Reused<std::uint64_t> finite;  ///< a bit a point: bit i % 64 of word i / 64
+  Moments moments;               ///< of the finite points, each of weight 1
 };
 
 /// Which points speak for a model, and with what weight: those within `tolerance` of it and, where there are caps, within their cap;

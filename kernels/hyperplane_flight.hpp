@@ -2,7 +2,8 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
+
+#include "kernels/reused.hpp"
 
 namespace swarmfit::kernels {
 
@@ -28,7 +29,7 @@ class HyperplaneFlight {
 
  private:
   std::size_t axes_, places_;
-  std::vector<double> values_;
+  Reused<double> values_;
 };
 
 }  // namespace swarmfit::kernels

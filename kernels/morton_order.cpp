@@ -6,6 +6,7 @@
 
 #include "kernels/bit_spread.hpp"
 #include "kernels/cpu/tasks.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::kernels {
 namespace {
@@ -19,7 +20,7 @@ constexpr std::size_t kMostAtOnce = std::size_t{1} << 20;  ///< points beyond wh
 
 /// Where most of a column lies: from its 2nd to its 98th percentile, by a sample, and a quarter more on both sides. Strays do not count.
 std::pair<float, float> bulk(const float* column, std::size_t count) {
-  std::vector<float> sample;
+  Reused<float> sample;
   const std::size_t stride = count / kSample + 1;
   for (std::size_t i = 0; i < count; i += stride) sample.push_back(column[i]);
   const auto place = [&](std::size_t k) { return sample.begin() + static_cast<std::ptrdiff_t>(k); };

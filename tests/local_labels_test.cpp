@@ -57,7 +57,7 @@ TEST(LocalLabels, OutliersBeyondTheEndOfASegmentAreNotItsOwn) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Scene scene = half_a_line(700, seed);
     const auto distances = from_level(scene, 0.5);
-    const auto labels = swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<std::vector<float>>{distances}, kTau);
+    const auto labels = swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<kernels::Reused<float>>{distances}, kTau);
     for (std::size_t i = 0; i < labels.size(); ++i) {
       if (!(distances[i] <= kTau)) {
         EXPECT_EQ(labels[i], 0);
@@ -85,7 +85,7 @@ TEST(LocalLabels, AModelThatIsAsDenseAllAlongIsLabelledAsAWhole) {
     for (int i = 0; i < 60; ++i) scene.add(unit(rng), 0.5 + noise(rng), 1);
     for (int i = 0; i < 200; ++i) scene.add(unit(rng), unit(rng), 0);
     const auto distances = from_level(scene, 0.5);
-    local += scene.wrong(swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<std::vector<float>>{distances}, kTau));
+    local += scene.wrong(swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<kernels::Reused<float>>{distances}, kTau));
     // Bayes' rule with the true densities: 60 N(d; 0, sigma) of its own against 200.
     const double reach = kSigma * std::sqrt(2 * std::log(60 / (200 * kSigma * std::sqrt(2 * std::numbers::pi))));
     std::vector<std::uint16_t> best;
@@ -98,7 +98,7 @@ TEST(LocalLabels, AModelThatIsAsDenseAllAlongIsLabelledAsAWhole) {
 TEST(LocalLabels, WithoutOutliersAllWithinTheThresholdAreOwned) {
   const Scene scene = half_a_line(0, 1);
   const auto distances = from_level(scene, 0.5);
-  const auto labels = swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<std::vector<float>>{distances}, kTau);
+  const auto labels = swarm::label_locally(models::WorkingPoints(scene.view()), std::vector<kernels::Reused<float>>{distances}, kTau);
   for (std::size_t i = 0; i < labels.size(); ++i) EXPECT_EQ(labels[i], distances[i] <= kTau ? 1 : 0) << i;
 }
 
@@ -106,7 +106,7 @@ TEST(LocalLabels, TheNearerOfTwoModelsOwnsWhatBothClaim) {
   Scene scene = half_a_line(0, 2);
   const std::size_t one = scene.truth.size();
   for (std::size_t i = 0; i < one; ++i) scene.add(scene.xy[2 * i], scene.xy[2 * i + 1] + 2 * kSigma, 2);
-  const std::vector<std::vector<float>> distances{from_level(scene, 0.5), from_level(scene, 0.5 + 2 * kSigma)};
+  const std::vector<kernels::Reused<float>> distances{from_level(scene, 0.5), from_level(scene, 0.5 + 2 * kSigma)};
   const auto labels = swarm::label_locally(models::WorkingPoints(scene.view()), distances, kTau);
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] == 0) continue;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "host/common/parallel.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::common {
 
@@ -190,7 +191,7 @@ void PottsEnergy::make_stale(Piece& piece, std::size_t node, Label alpha) const 
 
 PottsEnergy::Cost PottsEnergy::expand(Piece& piece, const Takers& takers, std::vector<Label>& labels) {
   const Label alpha = takers.label;
-  std::vector<std::int32_t> part, take;
+  kernels::Reused<std::int32_t> part, take;
   part.reserve(takers.last - takers.first);
   take.reserve(takers.last - takers.first);
   for (std::size_t t = takers.first; t < takers.last; ++t) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 
 #include "kernels/fitness_evaluator.hpp"
 
@@ -13,7 +14,8 @@ namespace swarmfit::common {
 template <class Some>
 void in_ranges(kernels::FitnessEvaluator* workers, std::size_t count, std::size_t range, std::size_t few, Some&& some) {
   if (workers == nullptr || count <= few) return some(std::size_t{0}, count);
-  workers->share_out((count + range - 1) / range, [&](std::size_t k) { some(k * range, std::min(count, (k + 1) * range)); });
+  const auto one = [&](std::size_t k) { some(k * range, std::min(count, (k + 1) * range)); };
+  workers->share_out((count + range - 1) / range, std::cref(one));  // a reference fits where a function is kept
 }
 
 }  // namespace swarmfit::common

@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "kernels/reused.hpp"
+
 namespace swarmfit::models {
 namespace {
 
@@ -20,7 +22,7 @@ constexpr std::size_t kKept = std::size_t{1} << 16;  // points of a support that
 SupportRows::SupportRows(const WorkingPoints& points, const Weighted& support)
     : points_(points), support_(support), width_(static_cast<std::size_t>(points.dimension())) {
   if (size() > kKept) return;
-  std::vector<double> rows;
+  kernels::Reused<double> rows;
   rows.reserve(size() * width_);
   const auto keep = [&]<std::size_t D>(std::integral_constant<std::size_t, D>) {
     for (const std::uint32_t i : support.index) {
@@ -76,10 +78,10 @@ bool CurvedSpace::refine(const WorkingPoints& points, const Weighted& support, P
   return theta.allFinite();
 }
 
-Eigen::MatrixXd CurvedSpace::unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
+Covariance CurvedSpace::unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const {
   const Equations at = equations({points, support}, theta);
   const Basis chart = basis(theta);
-  const Eigen::MatrixXd information = at.information;
+  const Covariance information = at.information;
   return chart * information.completeOrthogonalDecomposition().pseudoInverse() * chart.transpose();
 }
 
@@ -88,11 +90,11 @@ double CurvedSpace::noise_variance(const WorkingPoints& points, const Weighted& 
   return squares({points, support}, theta) / std::max(1.0, degrees);
 }
 
-Eigen::MatrixXd CurvedSpace::covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const {
+Covariance CurvedSpace::covariance_to_data(const Covariance& covariance, const Position& theta, const Frame& frame) const {
   // to_data is smooth and well scaled in the working frame: central differences lose nothing that a covariance would show.
   constexpr double kStep = 1e-5;
   const int n = parameter_count();
-  Eigen::MatrixXd jacobian(n, n);
+  Covariance jacobian(n, n);
   for (int i = 0; i < n; ++i) {
     Position ahead = theta, behind = theta;
     ahead[i] += kStep;

@@ -10,6 +10,7 @@
 #include <Eigen/Dense>
 
 #include "host/models/model_space.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::models {
 
@@ -33,7 +34,7 @@ class SupportRows {
   const WorkingPoints& points_;
   Weighted support_;
   std::size_t width_;
-  std::vector<double> kept_;
+  kernels::Reused<double> kept_;
 };
 
 /// A kind whose residual is linearised around a position, as `Linearised` does. Chart: `freedom()` numbers near 0, the position itself
@@ -47,9 +48,9 @@ class CurvedSpace : public ModelSpace {
 
   double distance(const Position& a, const Position& b) const override;
   bool refine(const WorkingPoints& points, const Weighted& support, Position& theta) const override;
-  Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override;
+  Covariance unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override;
   double noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double squares) const override;
-  Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const override;
+  Covariance covariance_to_data(const Covariance& covariance, const Position& theta, const Frame& frame) const override;
 
  protected:
   /// Derivative of the position's entries by the chart, parameter_count() x freedom().

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <Eigen/Dense>
@@ -81,7 +82,7 @@ class Hyperplane : public ModelSpace {
     return refine(moments(points, support), theta);
   }
 
-  Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+  Covariance unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
     return covariance(moments(points, support), theta);
   }
 
@@ -91,7 +92,7 @@ class Hyperplane : public ModelSpace {
     return refine(moments(all, frame), theta);
   }
 
-  Eigen::MatrixXd covariance_by_moments(const kernels::Moments& all, const Frame& frame, const Position& theta) const override {
+  Covariance covariance_by_moments(const kernels::Moments& all, const Frame& frame, const Position& theta) const override {
     return covariance(moments(all, frame), theta);
   }
 
@@ -109,8 +110,8 @@ class Hyperplane : public ModelSpace {
     return theta;
   }
 
-  Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position&, const Frame& frame) const override {
-    Eigen::MatrixXd jacobian = Eigen::MatrixXd::Identity(D + 1, D + 1);
+  Covariance covariance_to_data(const Covariance& covariance, const Position&, const Frame& frame) const override {
+    Eigen::Matrix<double, D + 1, D + 1> jacobian = Eigen::Matrix<double, D + 1, D + 1>::Identity();
     jacobian(D, D) = frame.scale;
     for (int d = 0; d < D; ++d) jacobian(D, d) = -frame.centre[static_cast<std::size_t>(d)];
     return jacobian * covariance * jacobian.transpose();
@@ -185,15 +186,24 @@ class Hyperplane : public ModelSpace {
     return admit(theta);
   }
 
-  static Eigen::MatrixXd covariance(const Moments& m, const Position& theta) {
-    Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(D + 1, D + 1);
+  /// Of a symmetric matrix, which along the normal is singular.
+  static Eigen::Matrix<double, D, D> pseudo_inverse(const Eigen::Matrix<double, D, D>& information) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, D, D>> parts(information);
+    const double least = D * std::numeric_limits<double>::epsilon() * parts.eigenvalues()[D - 1];
+    Eigen::Matrix<double, D, 1> inverse;
+    for (int d = 0; d < D; ++d) inverse[d] = parts.eigenvalues()[d] > least ? 1 / parts.eigenvalues()[d] : 0.0;
+    return parts.eigenvectors() * inverse.asDiagonal() * parts.eigenvectors().transpose();
+  }
+
+  static Eigen::Matrix<double, D + 1, D + 1> covariance(const Moments& m, const Position& theta) {
+    Eigen::Matrix<double, D + 1, D + 1> covariance = Eigen::Matrix<double, D + 1, D + 1>::Zero();
     if (!(m.total > 0)) return covariance;
     // Residual n.x + o. With n moving in its tangent space T, the Jacobian row is [x^T T, 1]; its information is the scatter about the
     // mean for the direction and the total weight for the offset at the mean.
     const Vector n = theta.template head<D>();
     const Eigen::Matrix<double, D, D> project = Eigen::Matrix<double, D, D>::Identity() - n * n.transpose();
     const Eigen::Matrix<double, D, D> information = project * m.scatter * project * m.total;
-    const Eigen::Matrix<double, D, D> direction = information.completeOrthogonalDecomposition().pseudoInverse();
+    const Eigen::Matrix<double, D, D> direction = pseudo_inverse(information);
     covariance.topLeftCorner(D, D) = direction;
     covariance.block(0, D, D, 1) = -direction * m.mean;
     covariance.block(D, 0, 1, D) = covariance.block(0, D, D, 1).transpose();

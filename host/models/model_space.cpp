@@ -47,6 +47,14 @@ double ModelSpace::noise_variance(const WorkingPoints&, const Weighted& support,
 }
 
 std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior) { return row(type).make(prior); }
+int minimal_sample(ModelType type) {
+  static const auto sizes = [] {
+    std::array<int, kKinds.size()> all{};
+    std::transform(kKinds.begin(), kKinds.end(), all.begin(), [](const Kind& kind) { return kind.make({})->minimal_sample(); });
+    return all;
+  }();
+  return sizes[static_cast<std::size_t>(&row(type) - kKinds.data())];
+}
 kernels::ModelKind to_kernel(ModelType type) noexcept { return type == ModelType::own ? kernels::ModelKind::own : row(type).kernel; }
 
 }  // namespace models

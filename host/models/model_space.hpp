@@ -21,6 +21,8 @@ namespace swarmfit::models {
 /// A position: the model's parameters in the working frame. A velocity has the same number of entries. Short enough to lie in place: a
 /// swarm moves thousands of them.
 using Position = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kernels::kMaxParameters, 1>;
+/// Of a position's entries; as that, it needs no memory but its own.
+using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kernels::kMaxParameters, kernels::kMaxParameters>;
 
 /// Points and weights of a least-squares problem.
 struct Weighted {
@@ -73,13 +75,13 @@ class ModelSpace {
   /// The weighted least-squares model; false if the points do not determine one.
   virtual bool refine(const WorkingPoints& points, const Weighted& support, Position& theta) const = 0;
   /// Covariance of a least-squares position given unit residual variance, in the working frame.
-  virtual Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
+  virtual Covariance unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const = 0;
 
   /// Whether least squares needs to know no more of its points than their moments. Then the two below serve as well as the two above, and
   /// nobody has to list the points.
   virtual bool closed_form() const noexcept { return false; }
   virtual bool refine_by_moments(const kernels::Moments&, const Frame&, Position&) const { return false; }
-  virtual Eigen::MatrixXd covariance_by_moments(const kernels::Moments&, const Frame&, const Position&) const { return {}; }
+  virtual Covariance covariance_by_moments(const kernels::Moments&, const Frame&, const Position&) const { return {}; }
 
   /// Variance of one residual component about a least-squares position; `squares` is the sum of squared distances [working frame]. Of kinds
   /// in closed form `support` is not looked at beyond its size.
@@ -92,7 +94,7 @@ class ModelSpace {
   virtual Position to_data(const Position& theta, const Frame& frame) const = 0;
   virtual Position from_data(const Position& parameters, const Frame& frame) const = 0;
   /// Covariance of the data-frame parameters from that of the position.
-  virtual Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const = 0;
+  virtual Covariance covariance_to_data(const Covariance& covariance, const Position& theta, const Frame& frame) const = 0;
 
   /// Pulls a position back inside the prior, if there is one; false where that cannot be done.
   virtual bool admit(Position& theta) const = 0;
@@ -106,6 +108,8 @@ struct Placed {
 
 /// The space of a built-in kind, with an optional prior on its direction.
 std::unique_ptr<ModelSpace> make_space(ModelType type, const std::optional<DirectionPrior>& prior);
+/// What ModelSpace::minimal_sample() of a kind that is built in says.
+int minimal_sample(ModelType type);
 std::unique_ptr<ModelSpace> make_own_space(const OwnModel& own);
 
 /// The kernels' name of a kind.

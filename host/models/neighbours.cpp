@@ -7,6 +7,7 @@
 #include <nanoflann.hpp>
 
 #include "host/common/ranges.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::models {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 /// The candidates' coordinates as nanoflann asks for them.
 template <std::size_t D>
 struct Rows {
-  std::vector<float> values;
+  kernels::Reused<float> values;
 
   std::size_t kdtree_get_point_count() const { return values.size() / D; }
   float kdtree_get_pt(std::size_t row, std::size_t column) const { return values[row * D + column]; }
@@ -53,8 +54,8 @@ constexpr std::size_t kRun = 64, kFew = 1024;
 
 /// Places of the `count` candidates nearest to each, one after the other.
 template <std::size_t D>
-std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
-                                           kernels::FitnessEvaluator* workers, std::span<const std::uint8_t> asked) {
+kernels::Reused<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::span<const std::uint32_t> candidates, std::size_t count,
+                                               kernels::FitnessEvaluator* workers, std::span<const std::uint8_t> asked) {
   constexpr std::size_t kLeaf = 24;  // points that are looked at one after the other
   Rows<D> rows;
   rows.values.reserve(candidates.size() * D);
@@ -62,11 +63,11 @@ std::vector<std::uint32_t> nearest_of_each(const WorkingPoints& points, std::spa
     for (const double x : points.row<D>(i)) rows.values.push_back(static_cast<float>(x));
   }
   const Tree<D> tree(static_cast<int>(D), rows, nanoflann::KDTreeSingleIndexAdaptorParams(kLeaf));
-  std::vector<std::uint32_t> nearest(candidates.size() * count);
+  kernels::Reused<std::uint32_t> nearest(candidates.size() * count);
   common::in_ranges(workers, candidates.size(), kRun, kFew, [&](std::size_t first, std::size_t last) {
-    std::vector<std::uint32_t> place(count + 1);
-    std::vector<float> square(count + 1);
-    std::vector<std::pair<float, std::uint32_t>> sorted;
+    kernels::Reused<std::uint32_t> place(count + 1);
+    kernels::Reused<float> square(count + 1);
+    kernels::Reused<std::pair<float, std::uint32_t>> sorted;
     for (std::size_t c = first; c < last; ++c) {
       if (!asked.empty() && asked[c] == 0) {
         std::fill_n(nearest.begin() + static_cast<std::ptrdiff_t>(c * count), count, static_cast<std::uint32_t>(c));

@@ -8,6 +8,7 @@
 
 #include "host/models/working_points.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::models {
 
@@ -28,7 +29,7 @@ class Neighbours {
 
  private:
   std::size_t count_ = 0;
-  std::vector<std::uint32_t> nearest_;
+  kernels::Reused<std::uint32_t> nearest_;
 };
 
 /// Unit normals of points in space, one a candidate: of the plane through it and its neighbours; zero where those have no one plane, and of

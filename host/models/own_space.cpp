@@ -72,7 +72,7 @@ class OwnSpace final : public ModelSpace {
     return descend(rows, points.frame().scale, theta);
   }
 
-  Eigen::MatrixXd unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
+  Covariance unit_covariance(const WorkingPoints& points, const Weighted& support, const Position& theta) const override {
     const Rows rows{rows_of(points, support.index), support.weight};
     const Problem at = linearise(rows, points.frame().scale, theta);
     // The residuals are in the data's unit, their variance is asked for in the working frame's.
@@ -85,7 +85,7 @@ class OwnSpace final : public ModelSpace {
   Position to_data(const Position& theta, const Frame& frame) const override { return moved(theta, frame, -1); }
   Position from_data(const Position& parameters, const Frame& frame) const override { return moved(parameters, frame, 1); }
 
-  Eigen::MatrixXd covariance_to_data(const Eigen::MatrixXd& covariance, const Position& theta, const Frame& frame) const override {
+  Covariance covariance_to_data(const Covariance& covariance, const Position& theta, const Frame& frame) const override {
     if (!own_.recentre) return covariance;
     // Within a thousandth of a deviation each way: that far the way back is straight.
     const int n = own_.parameter_count;

@@ -8,6 +8,7 @@
 #include "host/models/neighbours.hpp"
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/subset.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -22,7 +23,7 @@ constexpr int kPasses = 2;               // who lies along a model is asked agai
 
 /// Input indices of points near a model that nothing else explains better, kMost at most, evenly over the input. `left`: what others leave.
 std::vector<std::uint32_t> surroundings(const Ground& whole, std::span<const float> distances, std::span<const float> left) {
-  std::vector<std::uint32_t> near, drawn;
+  kernels::Reused<std::uint32_t> near, drawn;
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float allowed = whole.allowed_at(i), d = distances[i];
     if (d <= left[i] || (d <= kReach * allowed && left[i] == allowed)) near.push_back(static_cast<std::uint32_t>(i));
@@ -35,7 +36,7 @@ std::vector<std::uint32_t> surroundings(const Ground& whole, std::span<const flo
 
 /// Cosines of the angles between points' normals and a model's; 0 where a normal is not known.
 std::vector<double> cosines_of(const Ground& part, std::span<const Eigen::Vector3f> normals, const models::Position& theta) {
-  std::vector<double> cosines(part.size());
+  kernels::Reused<double> cosines(part.size());
   for (std::size_t k = 0; k < cosines.size(); ++k) {
     const Eigen::Vector3d outward = part.space.outward(theta, part.points.point<3>(part.index(k)));
     cosines[k] = std::abs(normals[k].cast<double>().dot(outward)) / std::max(outward.norm(), 1e-12);
@@ -46,7 +47,7 @@ std::vector<double> cosines_of(const Ground& part, std::span<const Eigen::Vector
 /// Caps of the points by which a model is to be refined: what they may be off, or 0 of those that do not lie along it. None where too few
 /// do.
 std::vector<float> caps_along(const Ground& part, std::span<const double> cosines, std::span<const float> distances) {
-  std::vector<float> caps(cosines.size());
+  kernels::Reused<float> caps(cosines.size());
   std::size_t own = 0, along = 0;
   for (std::size_t k = 0; k < caps.size(); ++k) {
     const bool near = distances[k] <= part.allowed_at(k), lies = cosines[k] >= kAlong;
@@ -62,7 +63,7 @@ Expected<> refine_on(const Ground& part, std::span<const Eigen::Vector3f> normal
   for (int pass = 0; pass < kPasses; ++pass) {
     const auto distances = measure(part, std::span(&model, 1));
     if (!distances) return tl::unexpected(distances.error());
-    const std::vector<float> caps = caps_along(part, cosines_of(part, normals, model.theta), distances->front());
+    const kernels::Reused<float> caps = caps_along(part, cosines_of(part, normals, model.theta), distances->front());
     if (caps.empty()) return {};
     if (auto done = refine_one(part, Loss::truncated_l1, caps, model.theta); !done) return tl::unexpected(done.error());
   }
@@ -74,16 +75,16 @@ Expected<> refine_on(const Ground& part, std::span<const Eigen::Vector3f> normal
 Expected<> refine_along(const Ground& whole, std::vector<models::Placed>& found, std::span<const models::Placed> hidden) {
   const auto is_round = [](const models::Placed& model) { return is_curved(model.space->type()); };
   if (whole.points.dimension() != 3 || std::none_of(found.begin(), found.end(), is_round)) return {};
-  std::vector<models::Placed> all = found;
+  kernels::Reused<models::Placed> all = found;
   all.insert(all.end(), hidden.begin(), hidden.end());
   const auto nearest = TwoNearest::of(whole, all);
   if (!nearest) return tl::unexpected(nearest.error());
-  std::vector<float> left(whole.size()), distances(whole.size()), allowed;
+  kernels::Reused<float> left(whole.size()), distances(whole.size()), allowed;
   for (std::size_t m = 0; m < found.size(); ++m) {
     if (!is_round(found[m])) continue;
     nearest->left_by_others(whole, m, left);
     if (const auto told = weigh(whole.of(*found[m].space), found[m].theta, {}, distances); !told) return tl::unexpected(told.error());
-    const std::vector<std::uint32_t> near = surroundings(whole, distances, left);
+    const kernels::Reused<std::uint32_t> near = surroundings(whole, distances, left);
     if (near.size() < kFewest) continue;
     const Subset subset(whole.points, near);
     Ground part{.evaluator = whole.evaluator, .space = *found[m].space, .points = whole.points, .tau = whole.tau, .part = &subset};

@@ -7,6 +7,7 @@
 
 #include "host/swarm/kinds.hpp"
 #include "host/swarm/split.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -22,7 +23,7 @@ Expected<> Candidates::in_runs(const Candidate& candidate, Visit&& visit) const 
     visit(std::size_t{0}, std::span<const float>(candidate.distances));
     return {};
   }
-  std::vector<float> distances;
+  kernels::Reused<float> distances;
   for (std::size_t first = 0; first < problem_.points.size(); first += kRun) {
     distances.resize(std::min(kRun, problem_.points.size() - first));
     if (auto done = tell_distances(problem_.whole(candidate.kind), candidate.theta, first, distances); !done) return done;
@@ -51,7 +52,7 @@ Expected<> Candidates::look(Candidate& candidate, int rounds) const {
 
 Expected<> Candidates::count(Candidate& candidate, std::span<const float> caps, const Near& near) const {
   candidate.support = {};
-  std::vector<float> caps_room, room;
+  kernels::Reused<float> caps_room, room;
   return in_runs(candidate, [&](std::size_t first, std::span<const float> distances) {
     const std::span<const float> here = caps.subspan(first, distances.size());
     const std::span<const std::uint8_t> beside = std::span(near.beside).subspan(near.beside.empty() ? 0 : first);
@@ -65,7 +66,7 @@ Expected<> Candidates::count(Candidate& candidate, std::span<const float> caps, 
 DeadZone Candidates::dead_zone(const Candidate& candidate, std::span<const float> caps) const {
   DeadZone zone{problem_.tau, problem_.allowed, tail_reach(candidate.support), {}, problem_.settings.dead_zone_slope};
   if (problem_.lists_distances() && zone.reach > 1 && problem_.space(candidate.kind).type() == ModelType::plane) {
-    std::vector<float> room, caps_room;
+    kernels::Reused<float> room, caps_room;
     const std::span<const float> distances = problem_.levelled(candidate.distances, room);
     zone.reaches =
         local_reach(problem_.points, candidate.theta.head<3>(), distances, problem_.levelled(caps, caps_room), problem_.tau, zone.reach);
@@ -107,14 +108,14 @@ Expected<std::optional<models::Position>> Candidates::come_apart(Candidate& cand
     halves[k].theta = (**pair)[k];
     if (auto done = look(halves[k], 0); !done) return tl::unexpected(done.error());
   }
-  std::vector<float> both = halves[0].distances;
+  kernels::Reused<float> both = halves[0].distances;
   take_nearer(halves[1].distances, both);
   if (!(saved(left_.caps(), both) > saved(left_.caps(), candidate.distances))) return std::nullopt;
   const std::size_t larger = halves[0].support.inliers() < halves[1].support.inliers() ? 1 : 0;
   Candidate &one = halves[larger], &other = halves[1 - larger];
   // Both must pay, the second by what the first leaves it.
   if (!pays(one)) return std::nullopt;
-  std::vector<float> caps = left_.caps();
+  kernels::Reused<float> caps = left_.caps();
   Near near = left_.near();
   if (auto done = sink(one, caps, near); !done) return tl::unexpected(done.error());
   if (auto done = count(other, caps, near); !done) return tl::unexpected(done.error());

@@ -12,6 +12,7 @@
 #include "host/swarm/payment.hpp"
 #include "host/swarm/problem.hpp"
 #include "host/swarm/unexplained.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -20,8 +21,8 @@ struct Candidate {
   std::size_t kind = 0;
   models::Position theta;
   double loss = 0;
-  double saving = 0;                  ///< of the swarm's best, on the points that were searched
-  std::vector<float> distances = {};  ///< of all points, where these are listed
+  double saving = 0;                      ///< of the swarm's best, on the points that were searched
+  kernels::Reused<float> distances = {};  ///< of all points, where these are listed
   Support support = {};
 };
 

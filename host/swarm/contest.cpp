@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "host/swarm/swarm.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -18,7 +19,7 @@ constexpr double kClearly = 1.1;                   // times what a flat model is
 
 /// The caps of those points that a model explains; 0 elsewhere.
 std::vector<float> own_caps(std::span<const float> caps, std::span<const float> distances) {
-  std::vector<float> own(caps.size());
+  kernels::Reused<float> own(caps.size());
   for (std::size_t i = 0; i < caps.size(); ++i) own[i] = distances[i] < caps[i] ? caps[i] : 0.0F;
   return own;
 }
@@ -84,7 +85,7 @@ Expected<bool> Contest::bends(const Candidate& winner, models::Position& flat) {
   // A curved model along both sides of an edge is two flat ones; about a box it is as many as the box has faces along it.
   constexpr int kFlats = 2, kFaces = 4;
   const std::size_t kind = problem_.flat_kind(winner.kind);
-  std::vector<float> caps = own_caps(left_.caps(), winner.distances), distances(caps.size());
+  kernels::Reused<float> caps = own_caps(left_.caps(), winner.distances), distances(caps.size());
   const double bare = worth_.bare_saving(caps, winner.distances);
   const double own =
       worth_.of(bare * worth_.agreement(winner.kind, winner.theta, caps, winner.distances), problem_.space(winner.kind).freedom());

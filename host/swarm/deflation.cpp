@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 
+#include "kernels/reused.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
@@ -24,11 +26,11 @@ struct Footprint {
 };
 
 /// Of the unexplained points within reach.
-std::vector<Footprint> footprints(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
-                                  std::span<const float> caps, float tau, int reach) {
+kernels::Reused<Footprint> footprints(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
+                                      std::span<const float> caps, float tau, int reach) {
   const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
   const float far = static_cast<float>(reach) * tau, least = kUnexplained * tau;
-  std::vector<Footprint> near;
+  kernels::Reused<Footprint> near;
   for (std::size_t i = 0; i < caps.size(); ++i) {
     if (!(distances[i] < far) || caps[i] < least) continue;
     const Eigen::Vector3d p = points.point<3>(i);
@@ -72,7 +74,7 @@ class PlaneCells {
 
  private:
   static constexpr int kAcross = 64;
-  std::vector<Cell> cells_;
+  kernels::Reused<Cell> cells_;
   double x_ = 0, y_ = 0, width_ = 1;
 };
 
@@ -99,10 +101,10 @@ int tail_reach(const Support& support) {
   return reach;
 }
 
-std::vector<float> local_reach(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
-                               std::span<const float> caps, float tau, int reach) {
-  std::vector<float> reaches(caps.size(), static_cast<float>(reach));
-  const std::vector<Footprint> near = footprints(points, normal, distances, caps, tau, reach);
+kernels::Reused<float> local_reach(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
+                                   std::span<const float> caps, float tau, int reach) {
+  kernels::Reused<float> reaches(caps.size(), static_cast<float>(reach));
+  const kernels::Reused<Footprint> near = footprints(points, normal, distances, caps, tau, reach);
   if (static_cast<double>(near.size()) < kPerCell) return reaches;
   PlaneCells cells(near);
   double own = 0;

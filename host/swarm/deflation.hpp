@@ -10,6 +10,7 @@
 
 #include "host/models/working_points.hpp"
 #include "host/swarm/payment.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -19,13 +20,13 @@ int tail_reach(const Support& support);
 
 /// Where a tail of unexplained points is no noise of the plane's own, but another surface beside it, as the far part of a wall that bends:
 /// there the plane itself has few points. `reach` one a point: that of the tail, or 1.
-std::vector<float> local_reach(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
-                               std::span<const float> caps, float tau, int reach);
+kernels::Reused<float> local_reach(const models::WorkingPoints& points, const Eigen::Vector3d& normal, std::span<const float> distances,
+                                   std::span<const float> caps, float tau, int reach);
 
 /// Where points are beside what has been found.
 struct Near {
-  std::vector<std::uint8_t> beside = {};  ///< one a point: is it less than kSlabs tau_i from a found model? Empty until there is one
-  std::vector<float> nearest = {};  ///< one a point, where points may be shared: how far the nearest found model is, where tau_i is tau
+  kernels::Reused<std::uint8_t> beside = {};  ///< one a point: is it less than kSlabs tau_i from a found model? Empty until there is one
+  kernels::Reused<float> nearest = {};  ///< one a point, where points may be shared: how far the nearest found model is, where tau_i is tau
 };
 
 /// What a found model takes with it.
@@ -33,7 +34,7 @@ struct DeadZone {
   float tau = 0;                        ///< [data unit]
   std::span<const float> allowed = {};  ///< tau_i, one a point, or empty where it is tau for all
   int reach = 1;                        ///< how far from the model nothing is left [tau_i]
-  std::vector<float> reaches = {};      ///< that of each point, or empty
+  kernels::Reused<float> reaches = {};  ///< that of each point, or empty
   double slope = 0;
 };
 

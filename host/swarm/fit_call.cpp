@@ -15,6 +15,7 @@
 #include "host/swarm/settle.hpp"
 #include "host/swarm/two_searches.hpp"
 #include "kernels/evaluators.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -129,27 +130,28 @@ Expected<> EvaluatorPair::make() {
   return {};
 }
 
-FitCall::FitCall(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair, const SwarmObserver& observer,
-                 const ModelCallback& on_model, Limits limits)
+FitCall::FitCall(const FitOptions& options, std::vector<Kind>& kinds, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair,
+                 const SwarmObserver& observer, const ModelCallback& on_model, Limits limits)
     : options_(options),
       evaluator_(evaluator),
       pair_(pair),
       on_model_(on_model),
       watch_{observer, 0},
       limits_(std::move(limits)),
-      kinds_(make_kinds(options)) {}
+      kinds_(kinds) {}
 
 Expected<std::size_t> FitCall::rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair) {
   constexpr std::size_t kPoints = 64;
   constexpr models::SyntheticMix kOneModel{1, 9};
-  const std::vector<float> values = models::synthetic_points(options.model, kPoints, options.seed, kOneModel);
+  const kernels::Reused<float> values = models::synthetic_points(options.model, kPoints, options.seed, kOneModel);
   if (values.empty()) return std::size_t{0};
   const FitOptions small = rehearsal_of(options);
   const SwarmObserver nobody;
   const ModelCallback untold;
   Limits limits;
   limits.max_models = 1;
-  const auto result = FitCall(small, evaluator, pair, nobody, untold, limits).run({values, dimension(options.model)}, {});
+  std::vector<Kind> kinds = make_kinds(small);
+  const auto result = FitCall(small, kinds, evaluator, pair, nobody, untold, limits).run({values, dimension(options.model)}, {});
   if (!result) return tl::unexpected(result.error());
   return result->models.size();
 }
@@ -184,7 +186,7 @@ Expected<> FitCall::take(const PointsView& points) {
 }
 
 Expected<> FitCall::thin() {
-  const std::vector<std::uint32_t> drawn = draw_part(whole_, Random(options_.seed), kThinnedPart, settings().fit_points, &evaluator_);
+  const kernels::Reused<std::uint32_t> drawn = draw_part(whole_, Random(options_.seed), kThinnedPart, settings().fit_points, &evaluator_);
   thin_rows_.emplace(whole_.view(), drawn, &evaluator_);
   auto looked_at = survey(evaluator_, thin_rows_->view());
   if (!looked_at) return tl::unexpected(looked_at.error());
@@ -263,7 +265,7 @@ Expected<FitCall::Found> FitCall::search_twice(const std::vector<Model>& warm_st
 
 Expected<> FitCall::finish(Found found, FitResult& result) {
   const auto tau = static_cast<float>(result.threshold);
-  const std::vector<float> allowed = allowed_by(thin_rows_ ? spread_of(options_.noise, whole_, depth_) : spread_, tau);
+  const kernels::Reused<float> allowed = allowed_by(thin_rows_ ? spread_of(options_.noise, whole_, depth_) : spread_, tau);
   const Ground ground{.evaluator = evaluator_, .space = *kinds_.front().space, .points = whole_, .tau = tau, .allowed = allowed};
   if (thin_rows_) {
     found.models = moved(std::move(found.models), thin_.frame(), whole_.frame());

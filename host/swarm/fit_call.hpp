@@ -33,9 +33,10 @@ class EvaluatorPair {
 
 class FitCall {
  public:
-  /// `options` are valid. All of it must outlive this. `observer` and `on_model` may be empty.
-  FitCall(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair, const SwarmObserver& observer,
-          const ModelCallback& on_model, Limits limits);
+  /// `options` are valid, and `kinds` what make_kinds() makes of them; their settings are resolved here. All of it must outlive this.
+  /// `observer` and `on_model` may be empty.
+  FitCall(const FitOptions& options, std::vector<Kind>& kinds, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair,
+          const SwarmObserver& observer, const ModelCallback& on_model, Limits limits);
 
   /// A fit of one model of the first kind to a few made-up points, of which nothing stays but that code and memory have been touched.
   /// Models found: none of an own kind, for which nothing is made up. Fails as run() does.
@@ -48,9 +49,9 @@ class FitCall {
  private:
   /// What a search has come to, in the frame of the points that it was given.
   struct Found {
-    std::vector<models::Placed> models, hidden;
-    std::vector<float> corners;         ///< of the loss that each model was refined with, of tau
-    std::vector<std::uint16_t> labels;  ///< of these points, or empty
+    kernels::Reused<models::Placed> models, hidden;
+    kernels::Reused<float> corners;         ///< of the loss that each model was refined with, of tau
+    kernels::Reused<std::uint16_t> labels;  ///< of these points, or empty
     bool shares_points = false;
     bool hidden_owns = false;
   };
@@ -80,12 +81,12 @@ class FitCall {
   const ModelCallback& on_model_;
   Watch watch_;
   Limits limits_;
-  std::vector<Kind> kinds_;
+  std::vector<Kind>& kinds_;
   models::WorkingPoints whole_, thin_;
   std::optional<Rows> thin_rows_;
   bool part_searched_ = false;
-  double depth_ = 0;           // of the near end, where noise grows with it
-  std::vector<float> spread_;  // of the working points
+  double depth_ = 0;               // of the near end, where noise grows with it
+  kernels::Reused<float> spread_;  // of the working points
   std::optional<Part> part_;
   std::vector<Known> known_;
   bool points_set_ = false;  // has the evaluator the searched points already?

@@ -16,6 +16,7 @@ namespace swarmfit {
 
 struct Fitter::State {
   FitOptions options;
+  std::vector<swarm::Kind> kinds;  // that they ask for
   std::shared_ptr<models::OwnWatch> watch = std::make_shared<models::OwnWatch>();
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
@@ -41,6 +42,7 @@ struct Fitter::State {
     }
     evaluator = std::move(made->evaluator);
     reason = std::move(made->reason);
+    kinds = swarm::make_kinds(wanted);
     options = std::move(wanted);
     return {};
   }
@@ -63,6 +65,7 @@ Expected<Fitter> Fitter::create(const FitOptions& options) try {
 Fitter FitterParts::assemble(const FitOptions& options, std::unique_ptr<kernels::FitnessEvaluator> evaluator, std::string reason) {
   auto state = std::make_unique<Fitter::State>();
   state->options = options;
+  state->kinds = swarm::make_kinds(options);
   state->evaluator = std::move(evaluator);
   state->reason = std::move(reason);
   return Fitter(std::move(state));
@@ -83,6 +86,7 @@ Expected<> Fitter::set_options(const FitOptions& options) try {
     return fail(Error::Kind::invalid_option, fmt::format("pipeline_cache is {}, must stay {}", options.pipeline_cache, old.pipeline_cache));
   if (options.own || old.own) return state_->open(options);
   FitOptions wanted = options;
+  state_->kinds = swarm::make_kinds(options);
   state_->options = std::move(wanted);
   return {};
 } catch (...) {
@@ -109,7 +113,7 @@ Expected<FitResult> Fitter::fit(const PointsView& points, const ModelCallback& o
   state_->watch->take();
   const ModelCallback told = common::going_by(on_model);
   const SwarmObserver observer = common::going_by(state_->observer);
-  swarm::FitCall call(state_->options, *state_->evaluator, state_->pair, observer, told, std::move(limits));
+  swarm::FitCall call(state_->options, state_->kinds, *state_->evaluator, state_->pair, observer, told, std::move(limits));
   auto result = call.run(points, warm_start);
   if (!result) return result;
   if (auto thrown = state_->watch->take()) return tl::unexpected(std::move(*thrown));

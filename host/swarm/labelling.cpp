@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <utility>
 
 #include "host/swarm/payment.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -38,15 +38,19 @@ Labelling::Labelling(const Ground& ground, const Subset& part, const models::Nei
     farthest_ = unbent(kFarthest * ground.tau) / ground.tau;
   }
   if (!(prices.smoothness > 0) || neighbours.empty()) return;
-  std::map<std::pair<int, int>, int> asked;
+  kernels::Reused<std::pair<int, int>> asked;
   for (std::size_t i = 0; i < part.index().size(); ++i) {
     const auto near = neighbours.of(i);
     for (std::size_t k = 0; k < std::min(kSmoothed, near.size()); ++k) {
       const int one = static_cast<int>(i), other = static_cast<int>(near[k]);
-      ++asked[{std::min(one, other), std::max(one, other)}];
+      asked.emplace_back(std::min(one, other), std::max(one, other));
     }
   }
-  edges_.assign(asked.begin(), asked.end());
+  std::sort(asked.begin(), asked.end());
+  for (const auto& ends : asked) {
+    if (edges_.empty() || edges_.back().first != ends) edges_.emplace_back(ends, 0);
+    ++edges_.back().second;
+  }
 }
 
 float Labelling::bent(float distance) const {
@@ -62,17 +66,17 @@ float Labelling::unbent(float cost) const {
   return ground_.tau * bend * std::expm1(cost / ground_.tau * per_bend_);
 }
 
-Expected<std::vector<std::vector<float>>> Labelling::measure(std::span<const models::Position> models) const {
+Expected<kernels::Reused<kernels::Reused<float>>> Labelling::measure(std::span<const models::Position> models) const {
   ModelRows rows(ground_.points.frame(), models.size());
   for (const models::Position& theta : models) rows.add(ground_.space, theta);
   const std::size_t points = part_.index().size();
-  std::vector<float> all(points * models.size());
-  std::vector<kernels::Evidence> evidence(models.size());
+  kernels::Reused<float> all(points * models.size());
+  kernels::Reused<kernels::Evidence> evidence(models.size());
   if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), all, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
   for (float& one : all) one = bent(one);
-  std::vector<std::vector<float>> distances(models.size());
+  kernels::Reused<kernels::Reused<float>> distances(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     distances[m].assign(all.begin() + static_cast<std::ptrdiff_t>(m * points), all.begin() + static_cast<std::ptrdiff_t>((m + 1) * points));
   }
@@ -87,7 +91,7 @@ void Labelling::label(State& state) {
   common::PottsEnergy& potts = potts_;
   potts.forget_labels();
   potts.reserve(points, points * (models + 1), edges_.size());
-  std::vector<std::uint16_t> nearest(points, 0);
+  kernels::Reused<std::uint16_t> nearest(points, 0);
   for (std::size_t i = 0; i < points; ++i) {
     potts.add_node();
     potts.add_label(0, static_cast<Cost>(kUnit));
@@ -115,7 +119,7 @@ void Labelling::label(State& state) {
   potts_smoothness_ = prices_.smoothness;
   potts.close();
   // The newest model first: where labels are known already it is the one that changes them.
-  std::vector<std::uint16_t> order(models + 1);
+  kernels::Reused<std::uint16_t> order(models + 1);
   std::iota(order.rbegin(), order.rend(), std::uint16_t{0});
   state.labels = std::move(nearest);
   if (potts.edges() > 0) potts.minimise(order, kCycles, state.labels, 1);
@@ -124,9 +128,9 @@ void Labelling::label(State& state) {
 
 Expected<bool> Labelling::refit(State& state) {
   State next = state;
-  std::vector<std::uint32_t> own;
-  std::vector<std::size_t> moved;
-  std::vector<models::Position> to;
+  kernels::Reused<std::uint32_t> own;
+  kernels::Reused<std::size_t> moved;
+  kernels::Reused<models::Position> to;
   for (std::size_t m = 0; m < state.models.size(); ++m) {
     own.clear();
     for (std::size_t i = 0; i < part_.index().size(); ++i) {
@@ -136,7 +140,7 @@ Expected<bool> Labelling::refit(State& state) {
     const std::uint64_t twice = mark_of(own), once = twice - 1;
     if (next.fitted[m] == twice) continue;
     next.fitted[m] = next.fitted[m] == once ? twice : once;
-    const std::vector<double> weight(own.size(), 1.0);
+    const kernels::Reused<double> weight(own.size(), 1.0);
     if (!ground_.space.refine(ground_.points, {own, weight}, next.models[m])) next.models[m] = state.models[m];
     moved.push_back(m);
     to.push_back(next.models[m]);
@@ -230,8 +234,8 @@ Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<co
   return adopted;
 }
 
-void Labelling::weigh_gains(std::span<const std::vector<float>> distances, std::vector<double>& gains) const {
-  std::vector<float> now(part_.index().size());
+void Labelling::weigh_gains(std::span<const kernels::Reused<float>> distances, std::vector<double>& gains) const {
+  kernels::Reused<float> now(part_.index().size());
   for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
   for (std::size_t p = 0; p < gains.size(); ++p) {
     // What promises nothing now is not asked again.
@@ -243,7 +247,7 @@ void Labelling::weigh_gains(std::span<const std::vector<float>> distances, std::
 Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
   auto distances = measure(proposals);
   if (!distances) return tl::unexpected(distances.error());
-  std::vector<double> gains(proposals.size(), std::numeric_limits<double>::infinity());
+  kernels::Reused<double> gains(proposals.size(), std::numeric_limits<double>::infinity());
   weigh_gains(*distances, gains);
   bool any = false;
   for (int failures = 0; failures < kFailures && !full() && !enough_();) {
@@ -279,7 +283,7 @@ Expected<> Labelling::start(std::span<const models::Position> models) {
 
 double Labelling::coherence() const {
   const std::size_t points = state_.labels.size();
-  std::vector<std::size_t> owned(state_.models.size() + 1, 0);
+  kernels::Reused<std::size_t> owned(state_.models.size() + 1, 0);
   for (const std::uint16_t l : state_.labels) ++owned[l];
   double alike = 0, by_chance = 0, asked = 0;
   for (const auto& [ends, count] : edges_) {

@@ -15,6 +15,7 @@
 #include "host/swarm/refinement.hpp"
 #include "host/swarm/settings.hpp"
 #include "host/swarm/subset.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -66,7 +67,7 @@ class Labelling {
   /// A number that tells the set of a model's points from others.
   std::uint64_t owned_set(std::size_t model) const;
 
-  const std::vector<models::Position>& models() const noexcept { return state_.models; }
+  std::span<const models::Position> models() const noexcept { return state_.models; }
   /// What each point of the cloud costs as things stand, at most tau [data unit]; tau where no model owns it, 0 where it is not finite.
   void costs(std::span<float> costs) const;
   /// For each model its place in the list given to start, or kJoined for a proposal.
@@ -77,15 +78,15 @@ class Labelling {
 
  private:
   struct State {
-    std::vector<models::Position> models;
-    std::vector<std::vector<float>> distances;  // of each model, one a point of the part, as they count: bent
-    std::vector<std::uint64_t> fitted;          // of each model, what tells the points that it was last fitted to, and how often; 0 none
-    std::vector<std::uint16_t> labels;          // one a point of the part
+    kernels::Reused<models::Position> models;
+    kernels::Reused<kernels::Reused<float>> distances;  // of each model, one a point of the part, as they count: bent
+    kernels::Reused<std::uint64_t> fitted;  // of each model, what tells the points that it was last fitted to, and how often; 0 none
+    kernels::Reused<std::uint16_t> labels;  // one a point of the part
     double energy = 0;
   };
 
   /// Of each model to each point of the part, bent.
-  Expected<std::vector<std::vector<float>>> measure(std::span<const models::Position> models) const;
+  Expected<kernels::Reused<kernels::Reused<float>>> measure(std::span<const models::Position> models) const;
   /// What a distance counts as, so that tau stays tau: small ones tell models apart, and large ones hardly. And back [data unit].
   float bent(float distance) const;
   float unbent(float cost) const;
@@ -102,12 +103,12 @@ class Labelling {
   Expected<bool> adopt(State&& with, double hopeless = std::numeric_limits<double>::infinity());
   static void remove(State& state, std::size_t model);
   /// Input indices of a model's points.
-  std::vector<std::uint32_t> owned(std::size_t model) const;
+  kernels::Reused<std::uint32_t> owned(std::size_t model) const;
   /// Fits a model to those points of the part that `takes` names; it stays where they do not determine one.
   template <class Takes>
   void fit_to(Takes&& takes, models::Position& theta) const;
   /// What each proposal would save of what the points cost as things stand, in units of tau.
-  void weigh_gains(std::span<const std::vector<float>> distances, std::vector<double>& gains) const;
+  void weigh_gains(std::span<const kernels::Reused<float>> distances, std::vector<double>& gains) const;
 
   const Ground& ground_;
   const Subset& part_;

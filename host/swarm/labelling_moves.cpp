@@ -5,6 +5,7 @@
 
 #include "host/swarm/labelling.hpp"
 #include "host/swarm/payment.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -16,8 +17,8 @@ constexpr double kWorthTrying = 0.75;  // of a model's price that the halves of 
 constexpr double kWithinReach = 3;     // of what joining saves that a proposal may cost before it is fitted to the points of both
 
 /// The places of the `count` largest, the largest first.
-std::vector<std::size_t> largest(std::span<const double> values, std::size_t count) {
-  std::vector<std::size_t> order(values.size());
+kernels::Reused<std::size_t> largest(std::span<const double> values, std::size_t count) {
+  kernels::Reused<std::size_t> order(values.size());
   for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
   const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size()));
   std::partial_sort(order.begin(), end, order.end(),
@@ -28,8 +29,8 @@ std::vector<std::size_t> largest(std::span<const double> values, std::size_t cou
 
 }  // namespace
 
-std::vector<std::uint32_t> Labelling::owned(std::size_t model) const {
-  std::vector<std::uint32_t> own;
+kernels::Reused<std::uint32_t> Labelling::owned(std::size_t model) const {
+  kernels::Reused<std::uint32_t> own;
   for (std::size_t i = 0; i < state_.labels.size(); ++i) {
     if (state_.labels[i] == model + 1) own.push_back(part_.index()[i]);
   }
@@ -55,25 +56,25 @@ double Labelling::border(std::size_t one, std::size_t other) const {
 
 template <class Takes>
 void Labelling::fit_to(Takes&& takes, models::Position& theta) const {
-  std::vector<std::uint32_t> own;
+  kernels::Reused<std::uint32_t> own;
   for (std::size_t i = 0; i < part_.index().size(); ++i) {
     if (takes(i)) own.push_back(part_.index()[i]);
   }
-  const std::vector<double> weight(own.size(), 1.0);
+  const kernels::Reused<double> weight(own.size(), 1.0);
   models::Position fitted = theta;
   if (ground_.space.refine(ground_.points, {own, weight}, fitted)) theta = std::move(fitted);
 }
 
 Expected<bool> Labelling::replace(std::size_t model, std::span<const models::Position> proposals) {
   // What each point costs without this model.
-  std::vector<float> without(part_.index().size(), ground_.tau);
+  kernels::Reused<float> without(part_.index().size(), ground_.tau);
   for (std::size_t i = 0; i < without.size(); ++i) {
     const std::size_t l = state_.labels[i];
     if (l != 0 && l != model + 1) without[i] = std::min(ground_.tau, state_.distances[l - 1][i]);
   }
-  std::vector<models::Position> tried(proposals.begin(), proposals.end());
-  std::vector<std::vector<float>> distances;
-  std::vector<double> gains;
+  kernels::Reused<models::Position> tried(proposals.begin(), proposals.end());
+  kernels::Reused<kernels::Reused<float>> distances;
+  kernels::Reused<double> gains;
   for (int fit = 0; fit <= kFits; ++fit) {
     auto measured = measure(tried);
     if (!measured) return tl::unexpected(measured.error());
@@ -81,7 +82,7 @@ Expected<bool> Labelling::replace(std::size_t model, std::span<const models::Pos
     gains.clear();
     for (const std::vector<float>& one : distances) gains.push_back(saved(without, one));
     if (fit == kFits) break;
-    std::vector<models::Position> next;
+    kernels::Reused<models::Position> next;
     for (const std::size_t p : largest(gains, kTried)) {
       fit_to([&](std::size_t i) { return distances[p][i] < without[i]; }, tried[p]);
       next.push_back(std::move(tried[p]));
@@ -101,16 +102,16 @@ Expected<bool> Labelling::split(std::size_t model, std::span<const models::Posit
   if (full()) return false;
   const auto ours = [&](std::size_t i) { return state_.labels[i] == model + 1; };
   const std::size_t points = part_.index().size();
-  std::vector<float> now(points, 0);
+  kernels::Reused<float> now(points, 0);
   for (std::size_t i = 0; i < points; ++i) now[i] = ours(i) ? std::min(ground_.tau, state_.distances[model][i]) : 0.0F;
   auto measured = measure(proposals);
   if (!measured) return tl::unexpected(measured.error());
-  std::vector<double> gains;
+  kernels::Reused<double> gains;
   for (const std::vector<float>& one : *measured) gains.push_back(saved(now, one));
   for (const std::size_t p : largest(gains, kTried)) {
     if (gains[p] < kHint * prices_.model * static_cast<double>(ground_.tau)) break;
     std::array<models::Position, 2> halves{state_.models[model], proposals[p]};
-    std::vector<std::vector<float>> distances{state_.distances[model], (*measured)[p]};
+    kernels::Reused<kernels::Reused<float>> distances{state_.distances[model], (*measured)[p]};
     for (int fit = 0; fit < kFits; ++fit) {
       for (std::size_t k = 0; k < 2; ++k) {
         fit_to([&](std::size_t i) { return ours(i) && (k == 0 ? distances[0][i] <= distances[1][i] : distances[1][i] < distances[0][i]); },
@@ -120,7 +121,7 @@ Expected<bool> Labelling::split(std::size_t model, std::span<const models::Posit
       if (!again) return tl::unexpected(again.error());
       distances = std::move(*again);
     }
-    std::vector<float> both = distances[0];
+    kernels::Reused<float> both = distances[0];
     take_nearer(distances[1], both);
     if (!(saved(now, both) > kWorthTrying * prices_.model * static_cast<double>(ground_.tau))) continue;
     State with = state_;
@@ -144,7 +145,7 @@ Expected<bool> Labelling::split(std::size_t model, std::span<const models::Posit
 Expected<bool> Labelling::join(std::size_t one, std::size_t other, std::span<const models::Position> proposals) {
   const auto ours = [&](std::size_t i) { return state_.labels[i] == one + 1 || state_.labels[i] == other + 1; };
   const std::size_t points = part_.index().size();
-  std::vector<float> most(points, 0);
+  kernels::Reused<float> most(points, 0);
   double now = 0, all = 0;
   for (std::size_t i = 0; i < points; ++i) {
     if (!ours(i)) continue;
@@ -154,13 +155,13 @@ Expected<bool> Labelling::join(std::size_t one, std::size_t other, std::span<con
   }
   auto measured = measure(proposals);
   if (!measured) return tl::unexpected(measured.error());
-  std::vector<double> gains;
+  kernels::Reused<double> gains;
   for (const std::vector<float>& each : *measured) gains.push_back(saved(most, each));
   const std::size_t best = largest(gains, 1).front();
   const double saves = prices_.model + border(one, other), tau = static_cast<double>(ground_.tau);
   if (all - gains[best] / tau - now > kWithinReach * saves) return false;
   models::Position theta = proposals[best];
-  std::vector<float> distances = std::move((*measured)[best]);
+  kernels::Reused<float> distances = std::move((*measured)[best]);
   for (int fit = 0; fit < kFits; ++fit) {
     fit_to([&](std::size_t i) { return ours(i) && distances[i] < ground_.tau; }, theta);
     auto again = measure({&theta, 1});
@@ -185,7 +186,7 @@ Expected<> Labelling::contend(std::span<const models::Position> others) {
   if (others.empty() || (most_ > 0 && others.size() > most_)) return {};
   auto distances = measure(others);
   if (!distances) return tl::unexpected(distances.error());
-  std::vector<models::Position> beaten = state_.models;
+  kernels::Reused<models::Position> beaten = state_.models;
   State with;
   with.models.assign(others.begin(), others.end());
   with.distances = std::move(*distances);

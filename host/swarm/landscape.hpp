@@ -9,6 +9,7 @@
 #include "host/models/model_space.hpp"
 #include "host/swarm/settings.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -46,9 +47,9 @@ class Landscape {
   const models::Frame& frame_;
   const Settings& settings_;
   Background background_;
-  std::vector<models::Position> optima_;
-  std::vector<double> parameters_, factor_, by_chance_;
-  std::vector<float> cutoffs_, costs_;
+  kernels::Reused<models::Position> optima_;
+  kernels::Reused<double> parameters_, factor_, by_chance_;
+  kernels::Reused<float> cutoffs_, costs_;
 };
 
 }  // namespace swarmfit::swarm

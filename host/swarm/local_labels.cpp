@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/reused.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
@@ -98,7 +100,7 @@ class Along {
   }
 
   int dimension_;
-  std::vector<One> all_;
+  kernels::Reused<One> all_;
 };
 
 /// How many times likelier a point at distance d of tau is the model's than an outlier, where `own` points near it are the model's
@@ -110,8 +112,8 @@ double odds(double own, double beside, double d) {
   return peak * std::exp(-0.5 * kSigmasPerTau * kSigmasPerTau * d * d) / outliers;
 }
 
-std::vector<std::uint16_t> nearest_of(std::span<const std::vector<float>> distances, float tau, std::size_t points) {
-  std::vector<std::uint16_t> labels(points, 0);
+kernels::Reused<std::uint16_t> nearest_of(std::span<const kernels::Reused<float>> distances, float tau, std::size_t points) {
+  kernels::Reused<std::uint16_t> labels(points, 0);
   for (std::size_t i = 0; i < points; ++i) {
     float least = std::numeric_limits<float>::infinity();
     for (std::size_t m = 0; m < distances.size(); ++m) {
@@ -193,20 +195,21 @@ class Reach {
   std::span<const float> distances_;
   std::uint16_t label_;
   float tau_;
-  std::vector<double> counts_;  // of the points along the model: 1 for one that is its own
-  std::vector<Asked> asked_;    // those within tau
+  kernels::Reused<double> counts_;  // of the points along the model: 1 for one that is its own
+  kernels::Reused<Asked> asked_;    // those within tau
 };
 
 }  // namespace
 
-std::vector<std::uint16_t> label_locally(const models::WorkingPoints& points, std::span<const std::vector<float>> distances, float tau) {
-  const std::vector<std::uint16_t> nearest = nearest_of(distances, tau, points.size());
-  std::vector<Reach> reaches;
+kernels::Reused<std::uint16_t> label_locally(const models::WorkingPoints& points, std::span<const kernels::Reused<float>> distances,
+                                             float tau) {
+  const kernels::Reused<std::uint16_t> nearest = nearest_of(distances, tau, points.size());
+  kernels::Reused<Reach> reaches;
   reaches.reserve(distances.size());
   for (std::size_t m = 0; m < distances.size(); ++m)
     reaches.emplace_back(points, distances[m], nearest, static_cast<std::uint16_t>(m + 1), tau);
-  std::vector<std::uint16_t> labels;
-  std::vector<float> least;
+  kernels::Reused<std::uint16_t> labels;
+  kernels::Reused<float> least;
   for (int pass = 0; pass < kPasses; ++pass) {
     if (pass > 0) {
       for (Reach& reach : reaches) reach.learn(nearest, labels);

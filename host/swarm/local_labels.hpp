@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host/models/working_points.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -18,6 +19,7 @@ namespace swarmfit::swarm {
 /// holds. Gives 0, none, or k for the k-th model.
 ///
 /// `distances`: of each model, one a point, levelled so that tau is the threshold of each; NaN where a point is not finite.
-std::vector<std::uint16_t> label_locally(const models::WorkingPoints& points, std::span<const std::vector<float>> distances, float tau);
+kernels::Reused<std::uint16_t> label_locally(const models::WorkingPoints& points, std::span<const kernels::Reused<float>> distances,
+                                             float tau);
 
 }  // namespace swarmfit::swarm

@@ -58,7 +58,7 @@ Expected<> MultiModel::look_for_models(const ModelCallback& on_model, const std:
   if (auto done = polish_.refine(found_, hidden_); !done) return done;
   share_out_ = std::make_unique<ShareOut>(problem_, left_, pilot_, candidates_);
   if (auto done = share_out_->run(found_, search_.proposals()); !done) return done;
-  if (auto why = pilot_.interrupted()) result.stop_reason = std::move(*why);
+  if (auto why = pilot_.interrupted()) result.stop_reason = *why;
   return {};
 }
 
@@ -101,7 +101,7 @@ Expected<> MultiModel::look_round_by_round(const Seeds& seeds, const ModelCallba
     if (!outcome) return tl::unexpected(outcome.error());
     if (*outcome == Outcome::interrupted) {
       // It may have been after the last swarm had come to its end.
-      if (auto why = pilot_.interrupted(); why && pilot_.why_ended().empty()) pilot_.end(std::move(*why));
+      if (auto why = pilot_.interrupted(); why && pilot_.why_ended().empty()) pilot_.end(*why);
       break;
     }
     if (*outcome == Outcome::found || *outcome == Outcome::flat) {
@@ -237,7 +237,7 @@ bool MultiModel::accept(const Candidate& candidate, const ModelCallback& on_mode
   model.inliers = static_cast<std::size_t>(std::lround(inliers * problem_.settings.stands_for));
   model.rms = inliers > 0 ? std::sqrt(candidate.support.square / inliers) : 0.0;
   found_.push_back({&problem_.space(candidate.kind), candidate.theta});
-  result.models.push_back(model);
+  result.models.push_back(std::move(model));
   result.iterations += pilot_.steps();
   if (problem_.settings.deflation == Deflation::parametric) pilot_.landscape(candidate.kind).deflate_around(candidate.theta);
   return !on_model || on_model(result.models.back()) == Verdict::go_on;

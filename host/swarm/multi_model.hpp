@@ -60,10 +60,10 @@ class MultiModel {
   /// Flat models that curved ones were taken for; not in the result.
   const std::vector<models::Placed>& hidden() const noexcept { return hidden_; }
   /// Labels of the points where they were shared out with an eye to their neighbours; else empty, and the nearest model owns each.
-  const std::vector<std::uint16_t>& labels() const noexcept { return labels_; }
+  const kernels::Reused<std::uint16_t>& labels() const noexcept { return labels_; }
 
  private:
-  using Seeds = std::vector<std::vector<models::Position>>;  // of each kind
+  using Seeds = kernels::Reused<std::vector<models::Position>>;  // of each kind
 
   /// Gives the evaluator what it is to know.
   Expected<> prepare();
@@ -102,8 +102,8 @@ class MultiModel {
   Polish polish_;
   std::function<void(std::span<const float>)> learn_;
   std::unique_ptr<ShareOut> share_out_;  // where the joint end of correspondences has begun
-  std::vector<models::Placed> found_, hidden_;
-  std::vector<std::uint16_t> labels_;
+  kernels::Reused<models::Placed> found_, hidden_;
+  kernels::Reused<std::uint16_t> labels_;
   bool points_set_ = false;
   bool stopped_by_caller_ = false;
   kernels::Effort effort_before_, effort_beside_;  // of the evaluator in earlier searches, and of another one

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernels/reused.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
@@ -13,7 +15,7 @@ constexpr double kMostSpread = 1e4;  // a hundred times as far as that: noise te
 }  // namespace
 
 double near_depth(const models::WorkingPoints& points) {
-  std::vector<double> depths;
+  kernels::Reused<double> depths;
   depths.reserve(points.finite_count());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (points.finite(i)) depths.push_back(std::abs(points.view().at(i, kDepth)));
@@ -24,9 +26,9 @@ double near_depth(const models::WorkingPoints& points) {
   return *near;
 }
 
-std::vector<float> spread_of(Noise noise, const models::WorkingPoints& points, double reference) {
+kernels::Reused<float> spread_of(Noise noise, const models::WorkingPoints& points, double reference) {
   if (noise == Noise::none || !(reference > 0)) return {};
-  std::vector<float> spread(points.size(), 1.0F);
+  kernels::Reused<float> spread(points.size(), 1.0F);
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!points.finite(i)) continue;
     const double ratio = points.view().at(i, kDepth) / reference;
@@ -35,8 +37,8 @@ std::vector<float> spread_of(Noise noise, const models::WorkingPoints& points, d
   return spread;
 }
 
-std::vector<float> allowed_by(std::span<const float> spread, float tau) {
-  std::vector<float> allowed(spread.begin(), spread.end());
+kernels::Reused<float> allowed_by(std::span<const float> spread, float tau) {
+  kernels::Reused<float> allowed(spread.begin(), spread.end());
   for (float& v : allowed) v *= tau;
   return allowed;
 }

@@ -7,6 +7,7 @@
 #include <swarmfit/fit.hpp>
 
 #include "host/models/working_points.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -15,9 +16,9 @@ double near_depth(const models::WorkingPoints& points);
 
 /// For each point how many times the threshold it may be off, >= 1: tau_i / tau = max(1, (z_i / reference)^2). Empty where that is 1 for
 /// all.
-std::vector<float> spread_of(Noise noise, const models::WorkingPoints& points, double reference);
+kernels::Reused<float> spread_of(Noise noise, const models::WorkingPoints& points, double reference);
 
 /// The thresholds themselves, one a point; empty where the spread is.
-std::vector<float> allowed_by(std::span<const float> spread, float tau);
+kernels::Reused<float> allowed_by(std::span<const float> spread, float tau);
 
 }  // namespace swarmfit::swarm

@@ -10,6 +10,7 @@
 #include "host/swarm/noise_model.hpp"
 #include "host/swarm/payment.hpp"
 #include "host/swarm/refinement.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -33,7 +34,7 @@ constexpr std::size_t kFirstModels = 2;  // at first, when the scale is not know
 }  // namespace
 
 double gaussian_part(std::span<const float> distances, double guess, double reach) {
-  std::vector<double> d;
+  kernels::Reused<double> d;
   for (const float v : distances) {
     if (v <= reach) d.push_back(static_cast<double>(v));
   }
@@ -183,7 +184,7 @@ class Estimate {
   Expected<> follow(std::vector<models::Placed>& found, double& tau) {
     const Settings& settings = kinds_.front().settings;
     for (int step = 0; step < kSteps; ++step) {
-      const std::vector<float> allowed = allowed_by(in_.spread, static_cast<float>(tau));
+      const kernels::Reused<float> allowed = allowed_by(in_.spread, static_cast<float>(tau));
       const Ground ground = ground_at(tau, allowed);
       if (step > 0) {
         cap(ground);
@@ -205,10 +206,10 @@ class Estimate {
   /// is at least as dense as the cloud would be if its points were strewn evenly, so that a slab as wide as the cloud means nothing.
   Expected<double> significance(const NoiseScale& scale) {
     const auto tau = static_cast<float>(scale.threshold);
-    const std::vector<float> allowed = allowed_by(in_.spread, tau);
+    const kernels::Reused<float> allowed = allowed_by(in_.spread, tau);
     const Ground ground = ground_at(scale.threshold, allowed);
     cap(ground);
-    std::vector<float> caps = caps_;
+    kernels::Reused<float> caps = caps_;
     for (std::size_t i = 0; i < caps.size(); ++i) caps[i] *= tau / ground.allowed_at(i);
     double evenly = 0, wide = 0;
     for (std::size_t i = 0; i < in_.points.size(); ++i) {
@@ -243,7 +244,7 @@ class Estimate {
 
   Input in_;
   std::vector<Kind> kinds_;
-  std::vector<float> distances_, nearest_, caps_;
+  kernels::Reused<float> distances_, nearest_, caps_;
   double width_;    // of the cloud, were its points strewn evenly [data unit]
   int rounds_ = 0;  // of search, so far
 };

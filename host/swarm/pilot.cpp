@@ -7,6 +7,7 @@
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/swarm.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -33,7 +34,7 @@ Pilot::Pilot(const Problem& problem, const Unexplained& left, Limits limits) : p
 
 double Pilot::elapsed_ms() const { return std::chrono::duration<double, std::milli>(Clock::now() - limits_.start).count(); }
 
-std::optional<std::string> Pilot::interrupted() const {
+std::optional<std::string_view> Pilot::interrupted() const {
   if (limits_.stop.stop_requested()) return "cancelled";
   if (limits_.budget_ms > 0 && elapsed_ms() >= limits_.budget_ms) return "time budget used up";
   return std::nullopt;
@@ -77,7 +78,7 @@ Expected<bool> Pilot::fly(Swarm& swarm, std::size_t kind, std::uint32_t round, s
   // Normals bring neighbourhoods that are too close for a kind which has no use for them.
   const bool close = problem_.points.dimension() > 3 || problem_.space(kind).needs_normals();
   Sampler sampler(problem_.points, problem_.part.index(), close ? problem_.neighbours : none_, problem_.space(kind), problem_.random);
-  std::vector<float> left, room;
+  kernels::Reused<float> left, room;
   const bool shown = problem_.settings.deflation == Deflation::residual;  // else the caps only tell what a model still explains
   if (!shown) problem_.part.gather(caps, left);
   sampler.prefer_unexplained(problem_.levelled(shown ? left_.part_caps() : left, room, problem_.part_allowed), alive);

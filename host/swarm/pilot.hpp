@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 #include <stop_token>
-#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -46,7 +46,7 @@ class Pilot {
   const Limits& limits() const noexcept { return limits_; }
   double elapsed_ms() const;
   /// Why the search must not go on, if so.
-  std::optional<std::string> interrupted() const;
+  std::optional<std::string_view> interrupted() const;
 
   /// Flies a swarm over the caps that were shown last, which are `caps`; false if it ended early, and why_ended() tells. Samples are of
   /// points whose cap is at least `alive`. Each `round` is another draw.
@@ -64,9 +64,10 @@ class Pilot {
   std::size_t steps() const noexcept { return steps_; }
   void set_steps(std::size_t steps) noexcept { steps_ = steps; }
   /// Why the search is over; empty while it goes on.
-  const std::string& why_ended() const noexcept { return why_ended_; }
-  void end(std::string why) { why_ended_ = std::move(why); }
-  void go_on() noexcept { why_ended_.clear(); }
+  std::string_view why_ended() const noexcept { return why_ended_; }
+  /// `why` must outlive this: it is a text of the program's.
+  void end(std::string_view why) noexcept { why_ended_ = why; }
+  void go_on() noexcept { why_ended_ = {}; }
 
   /// What is flown while this lives counts no steps, and ends the search only where that was interrupted.
   class Aside {
@@ -74,7 +75,7 @@ class Pilot {
     explicit Aside(Pilot& pilot) : pilot_(pilot), steps_(pilot.steps_), why_ended_(pilot.why_ended_) {}
     ~Aside() {
       pilot_.steps_ = steps_;
-      if (!pilot_.interrupted()) pilot_.why_ended_ = std::move(why_ended_);
+      if (!pilot_.interrupted()) pilot_.why_ended_ = why_ended_;
     }
     Aside(const Aside&) = delete;
     Aside& operator=(const Aside&) = delete;
@@ -82,7 +83,7 @@ class Pilot {
    private:
     Pilot& pilot_;
     std::size_t steps_;
-    std::string why_ended_;
+    std::string_view why_ended_;
   };
 
  private:
@@ -97,12 +98,12 @@ class Pilot {
   const Unexplained& left_;
   Limits limits_;
   const models::Neighbours none_;
-  std::vector<Landscape> landscapes_;  // of the points that are searched, one a kind
+  kernels::Reused<Landscape> landscapes_;  // of the points that are searched, one a kind
   Watch* watch_ = nullptr;
   std::uint32_t round_ = 0;
   double scale_ = 0;
   std::size_t steps_ = 0;
-  std::string why_ended_;
+  std::string_view why_ended_;
 };
 
 }  // namespace swarmfit::swarm

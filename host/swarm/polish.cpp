@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "host/swarm/local_labels.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -15,8 +16,8 @@ constexpr std::size_t kStarts = 2;  // of exchanges: they may end in different p
 constexpr int kExchanges = 30;      // of one of the points that a model runs through, at most
 
 /// Places of the `count` smallest of the distances that are at most `tau`, smallest first, and then the rest of those in their order.
-std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float tau, std::size_t count) {
-  std::vector<std::uint32_t> places;
+kernels::Reused<std::uint32_t> nearest_first(std::span<const float> distances, float tau, std::size_t count) {
+  kernels::Reused<std::uint32_t> places;
   for (std::uint32_t i = 0; i < distances.size(); ++i) {
     if (distances[i] <= tau) places.push_back(i);
   }
@@ -30,7 +31,7 @@ std::vector<std::uint32_t> nearest_first(std::span<const float> distances, float
 }  // namespace
 
 Expected<> Polish::refine(Models& found, std::span<const models::Placed> hidden) {
-  const std::vector<models::Placed> before = found;
+  const kernels::Reused<models::Placed> before = found;
   if (auto done = refine_each(found, hidden); !done) return done;
   return problem_.shares_out() || problem_.part_searched ? Expected<>() : keep_what_lowers(before, found);
 }
@@ -42,7 +43,7 @@ Expected<> Polish::keep_what_lowers(const Models& before, Models& found) const {
   if (!least) return tl::unexpected(least.error());
   if (!after) return tl::unexpected(after.error());
   if (!(*after > *least)) return {};
-  std::vector<models::Placed> kept = before;
+  kernels::Reused<models::Placed> kept = before;
   for (std::size_t m = 0; m < kept.size(); ++m) {
     std::swap(kept[m], found[m]);
     const auto now = joint_energy(problem_.ground, kept);
@@ -66,7 +67,7 @@ Expected<> Polish::refine_at_once(Models& found) const {
   };
   const auto before = weighed(found);
   if (!before) return tl::unexpected(before.error());
-  std::vector<models::Placed> refined = found;
+  kernels::Reused<models::Placed> refined = found;
   for (std::size_t m = 0; m < found.size(); ++m) {
     if (!swarm::refine(problem_.ground.of(*found[m].space), (*before)[m], {}, {}, refined[m].theta)) refined[m] = found[m];
   }
@@ -89,7 +90,7 @@ Expected<> Polish::refine_each(Models& found, std::span<const models::Placed> hi
   left_.restore();
   std::optional<TwoNearest> nearest;
   if (shared) {
-    std::vector<models::Placed> all = found;
+    kernels::Reused<models::Placed> all = found;
     all.insert(all.end(), hidden.begin(), hidden.end());
     auto measured = TwoNearest::of(problem_.ground, all);
     if (!measured) return tl::unexpected(measured.error());
@@ -112,14 +113,14 @@ Expected<> Polish::run_through_points(models::Placed& model) {
   const models::ModelSpace& of = *model.space;
   const auto size = static_cast<std::size_t>(of.minimal_sample());
   const std::size_t kind = place_of(model, problem_.kinds);
-  std::vector<float> distances(problem_.points.size());
+  kernels::Reused<float> distances(problem_.points.size());
   if (auto done = weigh(problem_.ground.of(of), model.theta, left_.caps(), distances); !done) return tl::unexpected(done.error());
-  std::vector<float> room;
+  kernels::Reused<float> room;
   const std::span<const float> level = problem_.levelled(distances, room);
-  const std::vector<std::uint32_t> near = nearest_first(level, kTouched * problem_.tau, kStarts * size);
+  const kernels::Reused<std::uint32_t> near = nearest_first(level, kTouched * problem_.tau, kStarts * size);
   if (near.size() <= kStarts * size) return {};
   // Where two models cross, turning about their common point would lead from one to the other.
-  std::vector<float> own = left_.caps();
+  kernels::Reused<float> own = left_.caps();
   for (std::size_t i = 0; i < own.size(); ++i) own[i] = level[i] <= kOwn * problem_.tau ? own[i] : 0.0F;
   if (auto done = left_.show(own); !done) return done;
 
@@ -145,8 +146,8 @@ Expected<> Polish::run_through_points(models::Placed& model) {
 }
 
 Expected<bool> Polish::exchange_one(std::size_t kind, std::span<const std::uint32_t> candidates, std::size_t which, Exchange& best) {
-  std::vector<models::Position> models;
-  std::vector<std::uint32_t> points, sample = best.sample;
+  kernels::Reused<models::Position> models;
+  kernels::Reused<std::uint32_t> points, sample = best.sample;
   for (const std::uint32_t point : candidates) {
     if (std::find(best.sample.begin(), best.sample.end(), point) != best.sample.end() && point != best.sample[which]) continue;
     sample[which] = point;
@@ -159,8 +160,8 @@ Expected<bool> Polish::exchange_one(std::size_t kind, std::span<const std::uint3
   bool better = false;
   for (std::size_t first = 0; first < models.size(); first += at_once) {
     const auto some = std::span(models).subspan(first, std::min(at_once, models.size() - first));
-    const std::vector<double> least(some.size(), best.loss);
-    std::vector<double> losses(some.size());
+    const kernels::Reused<double> least(some.size(), best.loss);
+    kernels::Reused<double> losses(some.size());
     if (auto done = pilot_.landscape(kind).fitness(some, least, losses); !done) return tl::unexpected(done.error());
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (!(losses[k] < best.loss)) continue;
@@ -186,16 +187,17 @@ Expected<> Polish::drop_unpaid(Models& found, std::vector<Model>& models) const 
   return {};
 }
 
-Expected<std::vector<std::uint16_t>> Polish::label(std::span<const models::Placed> found, std::span<const models::Placed> hidden) const {
-  std::vector<models::Placed> all(found.begin(), found.end());
+Expected<kernels::Reused<std::uint16_t>> Polish::label(std::span<const models::Placed> found,
+                                                       std::span<const models::Placed> hidden) const {
+  kernels::Reused<models::Placed> all(found.begin(), found.end());
   if (problem_.hidden_owns()) all.insert(all.end(), hidden.begin(), hidden.end());
   auto distances = measure(problem_.ground, all);
   if (!distances) return tl::unexpected(distances.error());
-  std::vector<float> room;
+  kernels::Reused<float> room;
   for (std::vector<float>& one : *distances) {
     if (problem_.levelled(one, room).data() == room.data()) one.swap(room);
   }
-  std::vector<std::uint16_t> labels = label_locally(problem_.points, *distances, problem_.tau);
+  kernels::Reused<std::uint16_t> labels = label_locally(problem_.points, *distances, problem_.tau);
   forget_beyond(found.size(), labels);
   return labels;
 }

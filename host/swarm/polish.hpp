@@ -11,6 +11,7 @@
 #include "host/swarm/pilot.hpp"
 #include "host/swarm/problem.hpp"
 #include "host/swarm/unexplained.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -24,7 +25,7 @@ class Polish {
   /// While there is a model that too few points would miss, it goes, out of `models` as well, and the others are refined together.
   Expected<> drop_unpaid(std::vector<models::Placed>& found, std::vector<Model>& models) const;
   /// Labels of all points with an eye to their neighbours (local_labels.hpp).
-  Expected<std::vector<std::uint16_t>> label(std::span<const models::Placed> found, std::span<const models::Placed> hidden) const;
+  Expected<kernels::Reused<std::uint16_t>> label(std::span<const models::Placed> found, std::span<const models::Placed> hidden) const;
 
  private:
   using Models = std::vector<models::Placed>;
@@ -38,7 +39,7 @@ class Polish {
   Expected<> run_through_points(models::Placed& model);
   struct Exchange {
     models::Position theta;
-    std::vector<std::uint32_t> sample;
+    kernels::Reused<std::uint32_t> sample;
     double loss = 0;
   };
   Expected<bool> exchange_one(std::size_t kind, std::span<const std::uint32_t> candidates, std::size_t which, Exchange& best);

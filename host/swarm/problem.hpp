@@ -16,6 +16,7 @@
 #include "host/swarm/settings.hpp"
 #include "host/swarm/subset.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -79,9 +80,9 @@ struct Problem {
   const Subset& part;
   const models::Neighbours& neighbours;  ///< of the part's points
   bool part_searched;
-  float tau;                                 ///< [data unit]
-  std::vector<float> allowed, part_allowed;  ///< tau of each point, and of the part's; empty: tau for all
-  Ground ground, part_ground;                ///< all points, and the part; as the first kind has it
+  float tau;                                     ///< [data unit]
+  kernels::Reused<float> allowed, part_allowed;  ///< tau of each point, and of the part's; empty: tau for all
+  Ground ground, part_ground;                    ///< all points, and the part; as the first kind has it
 };
 
 }  // namespace swarmfit::swarm

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "host/common/ranges.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -80,8 +81,8 @@ Expected<> tell_distances(const Ground& ground, const models::Position& theta, s
   return told ? Expected<>() : tl::unexpected(told.error());
 }
 
-Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
-  std::vector<kernels::Evidence> evidence(models.size());
+Expected<kernels::Reused<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models) {
+  kernels::Reused<kernels::Evidence> evidence(models.size());
   if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), models, {}, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
@@ -92,8 +93,8 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
             models::Position& theta) {
   if (evidence.count < static_cast<std::uint64_t>(ground.space.minimal_sample())) return false;
   if (ground.space.closed_form()) return ground.space.refine_by_moments(evidence.moments, ground.points.frame(), theta);
-  std::vector<std::uint32_t> index;
-  std::vector<double> weight;
+  kernels::Reused<std::uint32_t> index;
+  kernels::Reused<double> weight;
   index.reserve(evidence.count);
   weight.reserve(evidence.count);
   for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -108,7 +109,7 @@ bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<c
 Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const float> caps, models::Position& theta, int rounds,
                             std::vector<float>* distances) {
   const bool listed = distances != nullptr || needs_distances(ground, loss);
-  std::vector<float> own, tried(listed && rounds > 0 ? ground.size() : 0);
+  kernels::Reused<float> own, tried(listed && rounds > 0 ? ground.size() : 0);
   std::vector<float>& kept = distances != nullptr ? *distances : own;
   kept.resize(listed ? ground.size() : 0);
   auto evidence = weigh(ground, theta, caps, kept);
@@ -133,11 +134,11 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
 namespace {
 
 /// Distances to the first model, then to the second, and so on; in one pass, for which the points are loaded once.
-Expected<std::vector<float>> measure_in_rows(const Ground& ground, std::span<const models::Placed> models) {
+Expected<kernels::Reused<float>> measure_in_rows(const Ground& ground, std::span<const models::Placed> models) {
   ModelRows rows(ground.points.frame(), models.size());
   for (const auto& [space, theta] : models) rows.add(*space, theta);
-  std::vector<float> all(ground.size() * models.size());
-  std::vector<kernels::Evidence> evidence(models.size());
+  kernels::Reused<float> all(ground.size() * models.size());
+  kernels::Reused<kernels::Evidence> evidence(models.size());
   if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), rows.views(), all, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
@@ -146,11 +147,11 @@ Expected<std::vector<float>> measure_in_rows(const Ground& ground, std::span<con
 
 }  // namespace
 
-Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models) {
+Expected<kernels::Reused<kernels::Reused<float>>> measure(const Ground& ground, std::span<const models::Placed> models) {
   const auto all = measure_in_rows(ground, models);
   if (!all) return tl::unexpected(all.error());
   const std::size_t points = ground.size();
-  std::vector<std::vector<float>> distances(models.size());
+  kernels::Reused<kernels::Reused<float>> distances(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     const auto first = all->begin() + static_cast<std::ptrdiff_t>(m * points);
     distances[m].assign(first, first + static_cast<std::ptrdiff_t>(points));
@@ -161,7 +162,7 @@ Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::spa
 Expected<double> joint_energy(const Ground& ground, std::span<const models::Placed> models) {
   auto distances = measure(ground, models);
   if (!distances) return tl::unexpected(distances.error());
-  std::vector<float> least(ground.size());
+  kernels::Reused<float> least(ground.size());
   for (std::size_t i = 0; i < least.size(); ++i) least[i] = ground.allowed_at(i);
   for (const std::vector<float>& one : *distances) take_nearer(one, least);
   double energy = 0;
@@ -186,7 +187,7 @@ Expected<TwoNearest> TwoNearest::of(const Ground& ground, std::span<const models
   two.next_ = two.nearest_;
   two.whose_.assign(ground.size(), 0);
   // Model by model: the distances to all of them at once are more than the caches hold.
-  std::vector<float> distances(ground.size());
+  kernels::Reused<float> distances(ground.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     const Ground own = ground.of(*models[m].space);
     if (const auto told = weigh(own, models[m].theta, {}, distances); !told) return tl::unexpected(told.error());
@@ -218,11 +219,11 @@ void TwoNearest::left_by_others(const Ground& ground, std::size_t model, std::ve
 }
 
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds) {
-  std::vector<float> distances;
+  kernels::Reused<float> distances;
   auto energy = joint_energy(ground, models);
   if (!energy) return energy;
   for (int round = 0; round < rounds; ++round) {
-    std::vector<models::Placed> candidates = models;
+    kernels::Reused<models::Placed> candidates = models;
     for (std::size_t m = 0; m < models.size(); ++m) {
       const Ground own = ground.of(*models[m].space);
       distances.resize(needs_distances(own, Loss::truncated_l1) ? own.size() : 0);
@@ -234,19 +235,19 @@ Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed
     if (!candidate_energy) return candidate_energy;
     if (!(*candidate_energy < *energy)) break;
     const bool worthwhile = *energy - *candidate_energy > kWorthwhile * *energy;
-    models = std::move(candidates);
+    models.swap(candidates);
     energy = candidate_energy;
     if (!worthwhile) break;
   }
   return energy;
 }
 
-Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
+Expected<kernels::Reused<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models) {
   constexpr std::uint32_t kNobody = 0, kSeveral = ~std::uint32_t{0};
   const auto all = measure_in_rows(ground, models);
   if (!all) return tl::unexpected(all.error());
   const std::size_t points = ground.size();
-  std::vector<std::uint32_t> owner(points, kNobody);
+  kernels::Reused<std::uint32_t> owner(points, kNobody);
   for (std::size_t m = 0; m < models.size(); ++m) {
     const float* const distances = all->data() + m * points;
     const auto mine = static_cast<std::uint32_t>(m + 1);
@@ -262,7 +263,7 @@ Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::spa
       claim([&](std::size_t i) { return ground.allowed[i]; });
     }
   }
-  std::vector<std::size_t> unique(models.size(), 0);
+  kernels::Reused<std::size_t> unique(models.size(), 0);
   for (const std::uint32_t m : owner) {
     if (m != kNobody && m != kSeveral) ++unique[m - 1U];
   }

@@ -9,6 +9,7 @@
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/subset.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -58,8 +59,8 @@ class ModelRows {
 
  private:
   const models::Frame& frame_;
-  std::vector<models::Position> parameters_;
-  std::vector<kernels::ModelView> views_;
+  kernels::Reused<models::Position> parameters_;
+  kernels::Reused<kernels::ModelView> views_;
 };
 
 /// Labels beyond `last` are of models that are not in the result: nobody's.
@@ -78,7 +79,7 @@ Expected<kernels::Evidence> weigh(const Ground& ground, const models::Position& 
 Expected<> tell_distances(const Ground& ground, const models::Position& theta, std::size_t first, std::span<float> distances);
 
 /// The same of each of several models, all points within tau.
-Expected<std::vector<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models);
+Expected<kernels::Reused<kernels::Evidence>> weigh_all(const Ground& ground, std::span<const kernels::ModelView> models);
 
 /// The least-squares model of those points; false if they do not determine one. `distances` are those to theta.
 bool refine(const Ground& ground, const kernels::Evidence& evidence, std::span<const float> caps, std::span<const float> distances,
@@ -91,7 +92,7 @@ Expected<double> refine_one(const Ground& ground, Loss loss, std::span<const flo
                             std::vector<float>* distances = nullptr);
 
 /// Distances of the ground's points to each of several models, of whatever kinds; NaN where a point is not finite.
-Expected<std::vector<std::vector<float>>> measure(const Ground& ground, std::span<const models::Placed> models);
+Expected<kernels::Reused<kernels::Reused<float>>> measure(const Ground& ground, std::span<const models::Placed> models);
 
 /// How far each of the ground's points is from the nearest of several models and from the next.
 class TwoNearest {
@@ -105,8 +106,8 @@ class TwoNearest {
  private:
   void meet(std::uint32_t model, std::span<const float> distances, std::size_t first, std::size_t last);
 
-  std::vector<float> nearest_, next_;  // infinite where a point is not finite
-  std::vector<std::uint32_t> whose_;   // the nearest
+  kernels::Reused<float> nearest_, next_;  // infinite where a point is not finite
+  kernels::Reused<std::uint32_t> whose_;   // the nearest
 };
 
 /// Energy of all models together: sum over points of min(tau, distance to the nearest model) [data unit].
@@ -116,6 +117,6 @@ Expected<double> joint_energy(const Ground& ground, std::span<const models::Plac
 Expected<double> refine_jointly(const Ground& ground, std::vector<models::Placed>& models, int rounds = kMostRounds);
 
 /// For each model, the points within tau of it and of no other: what would be lost without it.
-Expected<std::vector<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models);
+Expected<kernels::Reused<std::size_t>> unique_support(const Ground& ground, std::span<const models::Placed> models);
 
 }  // namespace swarmfit::swarm

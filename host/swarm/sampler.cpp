@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "kernels/reused.hpp"
+
 namespace swarmfit::swarm {
 namespace {
 
@@ -96,10 +98,10 @@ void Sampler::draw(std::span<const Ask> asks, std::uint32_t round, std::uint32_t
   const auto wanted = static_cast<std::size_t>(space_.minimal_sample());
   const std::size_t at_once = space_.samples_at_once();
   std::fill(drawn.begin(), drawn.end(), std::uint8_t{0});
-  std::vector<std::uint32_t> left(asks.size()), samples;
+  kernels::Reused<std::uint32_t> left(asks.size()), samples;
   std::iota(left.begin(), left.end(), 0U);
-  std::vector<models::Position> found;
-  std::vector<std::uint8_t> sound;
+  kernels::Reused<models::Position> found;
+  kernels::Reused<std::uint8_t> sound;
   for (std::uint32_t attempt = 0; attempt < kAttempts && !left.empty();) {
     // Where few are left, several attempts of each fill what is solved at a time; the first that succeeds counts, as if made one by one.
     const auto ahead = static_cast<std::uint32_t>(std::max<std::size_t>(1, at_once / left.size()));
@@ -124,11 +126,11 @@ void Sampler::draw(std::span<const Ask> asks, std::uint32_t round, std::uint32_t
   }
 }
 
-std::vector<models::Position> Sampler::draw_some(std::uint32_t count, std::uint32_t local_every, std::uint32_t round) const {
-  std::vector<Ask> asks(count);
+kernels::Reused<models::Position> Sampler::draw_some(std::uint32_t count, std::uint32_t local_every, std::uint32_t round) const {
+  kernels::Reused<Ask> asks(count);
   for (std::uint32_t k = 0; k < count; ++k) asks[k] = {k, k % local_every == 0};
-  std::vector<models::Position> thetas(count), found;
-  std::vector<std::uint8_t> drawn(count);
+  kernels::Reused<models::Position> thetas(count), found;
+  kernels::Reused<std::uint8_t> drawn(count);
   draw(asks, round, 0, thetas, drawn);
   for (std::size_t k = 0; k < thetas.size(); ++k) {
     if (drawn[k] != 0) found.push_back(thetas[k]);

@@ -8,6 +8,7 @@
 #include "host/models/model_space.hpp"
 #include "host/models/neighbours.hpp"
 #include "host/swarm/random.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -28,7 +29,7 @@ class Sampler {
   void draw(std::span<const Ask> asks, std::uint32_t round, std::uint32_t step, std::span<models::Position> thetas,
             std::span<std::uint8_t> drawn) const;
   /// Models through `count` samples, of every `local_every` of them the first a local one; fewer where some are degenerate.
-  std::vector<models::Position> draw_some(std::uint32_t count, std::uint32_t local_every, std::uint32_t round) const;
+  kernels::Reused<models::Position> draw_some(std::uint32_t count, std::uint32_t local_every, std::uint32_t round) const;
 
   /// Leaves out candidates whose cap, one a candidate, has sunk below `least`, as long as enough remain.
   void prefer_unexplained(std::span<const float> caps, float least);
@@ -51,8 +52,8 @@ class Sampler {
 
   std::span<const std::uint32_t> candidates_;
   const models::Neighbours& neighbours_;
-  std::vector<std::uint32_t> live_;  // places in candidates_
-  std::vector<std::uint8_t> alive_;  // one a candidate
+  kernels::Reused<std::uint32_t> live_;  // places in candidates_
+  kernels::Reused<std::uint8_t> alive_;  // one a candidate
 };
 
 }  // namespace swarmfit::swarm

@@ -235,7 +235,7 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   s.stands_for = fitted > 0 ? static_cast<double>(finite_points) / static_cast<double>(fitted) : 1.0;
   // One point in a hundred, as CGAL's efficient RANSAC has it; never fewer than would be there by the sample itself.
   const std::size_t share = fitted / 100;
-  const int sample = options.own ? options.own->minimal_sample : models::make_space(options.model, {})->minimal_sample();
+  const int sample = options.own ? options.own->minimal_sample : models::minimal_sample(options.model);
   const auto least = 2 * static_cast<std::size_t>(sample) + 1;
   const auto wanted = static_cast<std::size_t>(std::ceil(static_cast<double>(options.min_inliers) / s.stands_for));
   s.min_inliers = options.min_inliers > 0 ? wanted : std::max(share, least);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "host/swarm/efficiency.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -18,7 +19,7 @@ ModelRows rows_of(const Ground& ground, std::span<const models::Placed> models) 
 /// What the points that each model owns already say of it; its cost is of all points.
 Expected<> weigh_own(const Ground& whole, std::span<const kernels::ModelView> models, std::span<const std::uint16_t> labels,
                      std::span<kernels::Evidence> evidence) {
-  std::vector<float> distances(labels.size() * models.size()), own(labels.size());
+  kernels::Reused<float> distances(labels.size() * models.size()), own(labels.size());
   if (auto done = whole.evaluator.weigh(whole.view(), {whole.tau, 1, {}}, models, distances, evidence); !done) {
     return tl::unexpected(to_error(done.error()));
   }
@@ -49,30 +50,30 @@ double variance_factor(double tau, double corner, double rms) {
 }
 
 /// In the working frame; from the points themselves where their moments do not tell it.
-Eigen::MatrixXd covariance(const Ground& whole, const kernels::Evidence& evidence, std::span<const std::uint16_t> labels, std::size_t label,
-                           const models::Position& theta) {
+models::Covariance covariance(const Ground& whole, const kernels::Evidence& evidence, std::span<const std::uint16_t> labels,
+                              std::size_t label, const models::Position& theta) {
   const double scale = whole.points.frame().scale, squares = evidence.square / (scale * scale);
   if (whole.space.closed_form()) {
     const double degrees = std::max(1.0, static_cast<double>(evidence.count) - whole.space.freedom());
     return squares / degrees * whole.space.covariance_by_moments(evidence.moments, whole.points.frame(), theta);
   }
-  std::vector<std::uint32_t> own;
+  kernels::Reused<std::uint32_t> own;
   own.reserve(evidence.count);
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] == label) own.push_back(static_cast<std::uint32_t>(i));
   }
-  const std::vector<double> weight(own.size(), 1.0);
+  const kernels::Reused<double> weight(own.size(), 1.0);
   const models::Weighted support{own, weight};
   return whole.space.noise_variance(whole.points, support, theta, squares) * whole.space.unit_covariance(whole.points, support, theta);
 }
 
 /// refit() of models that have no say in each other's points.
 Expected<> refit_apart(const Ground& whole, std::vector<models::Placed>& found, std::span<const models::Placed> hidden) {
-  std::vector<models::Placed> all = found;
+  kernels::Reused<models::Placed> all = found;
   all.insert(all.end(), hidden.begin(), hidden.end());
   const auto nearest = TwoNearest::of(whole, all);
   if (!nearest) return tl::unexpected(nearest.error());
-  std::vector<float> caps(whole.size()), own_distances(whole.size());
+  kernels::Reused<float> caps(whole.size()), own_distances(whole.size());
   for (std::size_t m = 0; m < found.size(); ++m) {
     nearest->left_by_others(whole, m, caps);
     const Ground own = whole.of(*found[m].space);
@@ -88,14 +89,14 @@ Expected<> refit_apart(const Ground& whole, std::vector<models::Placed>& found, 
 
 Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool shared, std::span<const models::Placed> hidden) {
   if (shared) return refit_apart(whole, found, hidden);
-  std::vector<kernels::Evidence> evidence;
+  kernels::Reused<kernels::Evidence> evidence;
   if (std::all_of(found.begin(), found.end(), [](const models::Placed& model) { return model.space->closed_form(); })) {
     const ModelRows models = rows_of(whole, found);
     auto all = weigh_all(whole, models.views());
     if (!all) return tl::unexpected(all.error());
     evidence = std::move(*all);
   }
-  std::vector<float> distances(evidence.empty() ? whole.size() : 0);
+  kernels::Reused<float> distances(evidence.empty() ? whole.size() : 0);
   for (std::size_t m = 0; m < found.size(); ++m) {
     const Ground own = whole.of(*found[m].space);
     kernels::Evidence known;
@@ -115,10 +116,10 @@ Expected<> refit(const Ground& whole, std::vector<models::Placed>& found, bool s
 Expected<> settle(const Ground& whole, const std::vector<models::Placed>& found, std::span<const models::Placed> hidden,
                   std::span<const float> corners, FitResult& result) {
   const models::Frame& frame = whole.points.frame();
-  std::vector<models::Placed> all = found;
+  kernels::Reused<models::Placed> all = found;
   all.insert(all.end(), hidden.begin(), hidden.end());
   const ModelRows models = rows_of(whole, all);
-  std::vector<kernels::Evidence> evidence(all.size());
+  kernels::Reused<kernels::Evidence> evidence(all.size());
   if (result.labels.empty()) {
     result.labels.resize(whole.points.size());
     const std::span<const float> tolerance = whole.allowed.empty() ? std::span<const float>(&whole.tau, 1) : whole.allowed;

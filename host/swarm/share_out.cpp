@@ -5,6 +5,7 @@
 #include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/swarm.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -26,7 +27,7 @@ ShareOut::ShareOut(const Problem& problem, Unexplained& left, Pilot& pilot, cons
 
 Expected<> ShareOut::run(std::span<const models::Placed> found, std::span<const models::Position> proposals) {
   labelling_.bound(pilot_.limits().max_models);
-  std::vector<models::Position> start;
+  kernels::Reused<models::Position> start;
   for (const models::Placed& model : found) start.push_back(model.theta);
   if (auto done = labelling_.start(start); !done) return done;
   if (auto joined = labelling_.offer(proposals); !joined) return tl::unexpected(joined.error());
@@ -49,7 +50,7 @@ Expected<> ShareOut::search_further() {
     Candidate candidate;
     candidate.theta = swarm.best();
     if (auto done = candidates_.refine(candidate); !done) return done;
-    std::vector<models::Position> proposals(swarm.own_bests().begin(), swarm.own_bests().end());
+    kernels::Reused<models::Position> proposals(swarm.own_bests().begin(), swarm.own_bests().end());
     proposals.push_back(std::move(candidate.theta));
     auto joined = labelling_.offer(proposals);
     if (!joined) return tl::unexpected(joined.error());
@@ -61,15 +62,15 @@ Expected<> ShareOut::search_further() {
 std::vector<models::Position> ShareOut::samples_of(std::span<const float> marks, int count, std::vector<models::Position> samples) {
   Sampler sampler(problem_.points, problem_.part.index(), problem_.neighbours, problem_.space(0), problem_.random);
   if (!sampler.keep_to(marks)) return {};
-  const std::vector<models::Position> drawn = sampler.draw_some(static_cast<std::uint32_t>(count), 2, pilot_.next_round());
+  const kernels::Reused<models::Position> drawn = sampler.draw_some(static_cast<std::uint32_t>(count), 2, pilot_.next_round());
   samples.insert(samples.end(), drawn.begin(), drawn.end());
   return samples;
 }
 
 Expected<bool> ShareOut::regroup_one(std::size_t model) {
-  std::vector<float> marks(problem_.points.size(), 0.0F);
+  kernels::Reused<float> marks(problem_.points.size(), 0.0F);
   labelling_.mark_owned(model, marks);
-  const std::vector<models::Position> samples = samples_of(marks, kSamples, {});
+  const kernels::Reused<models::Position> samples = samples_of(marks, kSamples, {});
   if (samples.empty()) return false;
   auto replaced = labelling_.replace(model, samples);
   if (!replaced) return replaced;
@@ -79,10 +80,10 @@ Expected<bool> ShareOut::regroup_one(std::size_t model) {
 }
 
 Expected<bool> ShareOut::regroup_two(std::size_t one, std::size_t other) {
-  std::vector<float> marks(problem_.points.size(), 0.0F);
+  kernels::Reused<float> marks(problem_.points.size(), 0.0F);
   labelling_.mark_owned(one, marks);
   labelling_.mark_owned(other, marks);
-  const std::vector<models::Position> samples = samples_of(marks, kJoinSamples, {labelling_.models()[one], labelling_.models()[other]});
+  const kernels::Reused<models::Position> samples = samples_of(marks, kJoinSamples, {labelling_.models()[one], labelling_.models()[other]});
   return samples.empty() ? Expected<bool>(false) : labelling_.join(one, other, samples);
 }
 
@@ -142,7 +143,7 @@ Expected<bool> ShareOut::any_pays(bool any_found) {
 }
 
 Expected<> ShareOut::describe(std::size_t of, std::span<const std::uint16_t> labels, Model& model) const {
-  std::vector<float> distances(problem_.points.size());
+  kernels::Reused<float> distances(problem_.points.size());
   const auto evidence = weigh(problem_.ground, labelling_.models()[of], {}, distances);
   if (!evidence) return tl::unexpected(evidence.error());
   double square = 0;
@@ -159,7 +160,7 @@ Expected<> ShareOut::describe(std::size_t of, std::span<const std::uint16_t> lab
 
 Expected<std::vector<bool>> ShareOut::conclude(std::span<const models::Placed> others, std::vector<models::Placed>& found,
                                                std::vector<Model>& models) {
-  std::vector<models::Position> rivals;
+  kernels::Reused<models::Position> rivals;
   for (const models::Placed& model : others) rivals.push_back(model.theta);
   if (auto done = labelling_.contend(rivals); !done) return tl::unexpected(done.error());
   if (auto done = labelling_.drop(); !done) return tl::unexpected(done.error());
@@ -171,7 +172,7 @@ Expected<std::vector<bool>> ShareOut::conclude(std::span<const models::Placed> o
   std::vector<Model> before = std::exchange(models, {});
   std::vector<bool> made;
   if (!*paid) return made;
-  const std::vector<std::uint16_t> all = labels();
+  const kernels::Reused<std::uint16_t> all = labels();
   for (std::size_t m = 0; m < labelling_.models().size(); ++m) {
     const std::size_t place = labelling_.kept()[m];
     found.push_back({&problem_.space(0), labelling_.models()[m]});
@@ -184,8 +185,8 @@ Expected<std::vector<bool>> ShareOut::conclude(std::span<const models::Placed> o
   return made;
 }
 
-std::vector<std::uint16_t> ShareOut::labels() const {
-  std::vector<std::uint16_t> all(problem_.points.size());
+kernels::Reused<std::uint16_t> ShareOut::labels() const {
+  kernels::Reused<std::uint16_t> all(problem_.points.size());
   labelling_.write(all);
   return all;
 }

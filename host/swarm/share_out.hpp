@@ -28,7 +28,7 @@ class ShareOut {
   Expected<std::vector<bool>> conclude(std::span<const models::Placed> others, std::vector<models::Placed>& found,
                                        std::vector<Model>& models);
   /// Of all points, once it has concluded.
-  std::vector<std::uint16_t> labels() const;
+  kernels::Reused<std::uint16_t> labels() const;
 
  private:
   /// Sets of points, by what tells them apart.

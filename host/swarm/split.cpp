@@ -7,6 +7,7 @@
 
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/subset.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -32,8 +33,8 @@ bool cross(const models::Position& a, const models::Position& b) { return std::a
 
 /// Points that may save something yet: those within tau of the suspect, in their order, and those around it.
 struct Places {
-  std::vector<std::uint32_t> own, around;  ///< input indices
-  std::vector<float> caps, distances;      ///< of those around
+  kernels::Reused<std::uint32_t> own, around;  ///< input indices
+  kernels::Reused<float> caps, distances;      ///< of those around
 };
 
 Places places_of(const Ground& part, const Suspect& suspect) {
@@ -122,11 +123,12 @@ double saved_by_both(const float* x, const float* y, std::size_t n) {
 /// Of planes that cross, the two that save most together; false if none saves more than `least`. `savings`: what each saves of each point.
 bool best_pair(std::span<const models::Position> planes, std::span<const float> savings, double least, Halves& pair) {
   const std::size_t n = savings.size() / planes.size();
-  std::vector<double> alone(planes.size());
-  std::vector<std::size_t> order(planes.size());
+  kernels::Reused<double> alone(planes.size());
+  kernels::Reused<std::size_t> order(planes.size());
   for (std::size_t k = 0; k < planes.size(); ++k) alone[k] = std::accumulate(&savings[k * n], &savings[k * n] + n, 0.0);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return alone[a] > alone[b]; });
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return alone[a] > alone[b] || (alone[a] == alone[b] && a < b); });
   bool found = false;
   for (std::size_t p = 0; p < order.size(); ++p) {
     // Together they save no more than each by itself.
@@ -144,10 +146,10 @@ bool best_pair(std::span<const models::Position> planes, std::span<const float> 
 
 /// Each refined in turn on what the other leaves it; at last the distances to both.
 Expected<> settle_pair(const Neighbourhood& there, std::span<const float> caps, float tau, Halves& pair,
-                       std::array<std::vector<float>, 2>& distances) {
-  std::vector<kernels::Evidence> evidence;
+                       std::array<kernels::Reused<float>, 2>& distances) {
+  kernels::Reused<kernels::Evidence> evidence;
   if (auto done = there.weigh(std::span(pair).subspan(1), tau, {}, distances[1], evidence); !done) return done;
-  std::vector<float> left(caps.size());
+  kernels::Reused<float> left(caps.size());
   for (std::size_t turn = 0; turn < kTurns; ++turn) {
     const std::size_t mine = turn % 2;
     std::copy(caps.begin(), caps.end(), left.begin());
@@ -159,7 +161,8 @@ Expected<> settle_pair(const Neighbourhood& there, std::span<const float> caps, 
 }
 
 /// Does a pair save enough beyond the suspect, and has either half enough of its own? `stands_for`: points of the cloud for each of these.
-bool worth_two(const Places& places, const std::array<std::vector<float>, 2>& distances, float tau, double stands_for, std::size_t least) {
+bool worth_two(const Places& places, const std::array<kernels::Reused<float>, 2>& distances, float tau, double stands_for,
+               std::size_t least) {
   std::array<double, 2> nearer{}, clear{};
   double gain = 0;
   for (std::size_t i = 0; i < places.caps.size(); ++i) {
@@ -190,10 +193,10 @@ Expected<std::optional<Halves>> crossing_pair(const Ground& part, const Suspect&
 
   const models::Neighbours none;
   const Sampler sampler(part.points, places.own, none, part.space, random);
-  std::vector<models::Position> planes = sampler.draw_some(kSamples, 1, kFirstSplit + number);
+  kernels::Reused<models::Position> planes = sampler.draw_some(kSamples, 1, kFirstSplit + number);
   const Neighbourhood there(part, places.around);
-  std::vector<float> savings;
-  std::vector<kernels::Evidence> evidence;
+  kernels::Reused<float> savings;
+  kernels::Reused<kernels::Evidence> evidence;
   if (auto done = there.weigh(planes, kNarrow * part.tau, {}, savings, evidence); !done) return tl::unexpected(done.error());
   for (std::size_t k = 0; k < planes.size(); ++k) there.refine(evidence[k], planes[k]);
   if (auto done = there.weigh(planes, kNarrow * part.tau, {}, savings, evidence); !done) return tl::unexpected(done.error());
@@ -207,7 +210,7 @@ Expected<std::optional<Halves>> crossing_pair(const Ground& part, const Suspect&
 
   Halves pair;
   if (planes.empty() || !best_pair(planes, savings, saved(places.caps, places.distances), pair)) return std::nullopt;
-  std::array<std::vector<float>, 2> distances;
+  std::array<kernels::Reused<float>, 2> distances;
   if (auto done = settle_pair(there, places.caps, part.tau, pair, distances); !done) return tl::unexpected(done.error());
   const double stands_for = all / (static_cast<double>(n) * static_cast<double>(part.size()));
   if (!cross(pair[0], pair[1]) || !worth_two(places, distances, part.tau, stands_for, suspect.least)) return std::nullopt;

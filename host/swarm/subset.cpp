@@ -7,6 +7,7 @@
 
 #include "host/common/ranges.hpp"
 #include "kernels/bit_spread.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -34,7 +35,7 @@ struct Coded {
 template <int DigitBits, class Code>
 void sort_by_digits(std::vector<Coded<Code>>& coded, int bits) {
   constexpr std::size_t kDigits = std::size_t{1} << DigitBits;
-  std::vector<Coded<Code>> room(coded.size());
+  kernels::Reused<Coded<Code>> room(coded.size());
   for (int shift = 0; shift < bits; shift += DigitBits) {
     std::array<std::uint32_t, kDigits> at{};
     const auto digit = [&](const Coded<Code>& one) { return (one.code >> shift) & (kDigits - 1); };
@@ -59,21 +60,21 @@ void share(kernels::FitnessEvaluator* workers, std::size_t count, Some&& some) {
 }
 
 template <std::size_t D, class Code>
-std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part, int bits,
-                                           kernels::FitnessEvaluator* workers) {
-  std::vector<Coded<Code>> coded(part.size());
+kernels::Reused<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part, int bits,
+                                               kernels::FitnessEvaluator* workers) {
+  kernels::Reused<Coded<Code>> coded(part.size());
   const kernels::BitSpread spread(static_cast<int>(D));
   share(workers, part.size(), [&](std::size_t first, std::size_t last) {
     for (std::size_t k = first; k < last; ++k) coded[k] = {static_cast<Code>(morton<D>(points.row<D>(part[k]), spread, bits)), part[k]};
   });
   sort_by_code(coded, bits * static_cast<int>(D));
-  std::vector<std::uint32_t> index(coded.size());
+  kernels::Reused<std::uint32_t> index(coded.size());
   std::transform(coded.begin(), coded.end(), index.begin(), [](const Coded<Code>& one) { return one.index; });
   return index;
 }
 
-std::vector<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part,
-                                           kernels::FitnessEvaluator* workers) {
+kernels::Reused<std::uint32_t> in_morton_order(const models::WorkingPoints& points, std::span<const std::uint32_t> part,
+                                               kernels::FitnessEvaluator* workers) {
   constexpr int kCellBits = 16;  // of a column
   // Points of a part of the cloud are farther apart: three digits tell them apart as well, also where some are far from all others.
   constexpr int kPartCellBits = 11, kPartCellBitsOf3 = 10;
@@ -99,10 +100,10 @@ void copy_rows(const std::byte* from, std::size_t stride, std::span<const std::u
 
 }  // namespace
 
-std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
-                                     kernels::FitnessEvaluator* workers) {
+kernels::Reused<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
+                                         kernels::FitnessEvaluator* workers) {
   const std::size_t n = points.finite_count(), runs = std::min(n, size);
-  std::vector<std::uint32_t> drawn(runs);
+  kernels::Reused<std::uint32_t> drawn(runs);
   if (runs == 0) return drawn;
   // Run k begins at floor(n k / runs).
   const std::size_t whole = n / runs, rest = n % runs;
@@ -158,11 +159,11 @@ double share_of_steady(const models::WorkingPoints& points, std::span<const floa
 
 }  // namespace
 
-std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
-                                            std::size_t size, std::span<const float> spread) {
+kernels::Reused<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
+                                                std::size_t size, std::span<const float> spread) {
   if (points.finite_count() <= size) return draw_part(points, random, number, size);
   const double share = share_of_steady(points, spread, size);
-  std::vector<std::uint32_t> drawn;
+  kernels::Reused<std::uint32_t> drawn;
   drawn.reserve(size + size / 8);
   std::array<std::uint32_t, 4> words{};
   for (std::size_t i = 0; i < spread.size(); ++i) {
@@ -197,8 +198,8 @@ void Subset::gather(std::span<const float> all, std::vector<float>& values) cons
 
 Part part_to_look_at(const models::WorkingPoints& points, const Random& random, std::size_t size, kernels::FitnessEvaluator* workers,
                      std::span<const float> spread) {
-  const std::vector<std::uint32_t> drawn = spread.empty() ? draw_part(points, random, kSearchedPart, size, workers)
-                                                          : draw_steady_part(points, random, kSearchedPart, size, spread);
+  const kernels::Reused<std::uint32_t> drawn = spread.empty() ? draw_part(points, random, kSearchedPart, size, workers)
+                                                              : draw_steady_part(points, random, kSearchedPart, size, spread);
   return {Subset(points, drawn, workers), {}};
 }
 
@@ -208,12 +209,12 @@ void learn_neighbourhoods(Part& part, models::WorkingPoints& points, const model
   const bool correspondences = points.dimension() > 3;
   if (!correspondences && !space.agrees_by_normals()) return;
   const std::span<const std::uint32_t> index = part.points.index();
-  std::vector<std::uint8_t> asked(left.size());
+  kernels::Reused<std::uint8_t> asked(left.size());
   std::transform(left.begin(), left.end(), asked.begin(), [](float cap) -> std::uint8_t { return cap > 0 ? 1 : 0; });
   part.neighbours = models::Neighbours(points, index, kNeighbours, workers, asked);
   if (!space.agrees_by_normals()) return;
-  const std::vector<Eigen::Vector3f> known = models::estimate_normals(points, index, part.neighbours, workers, asked);
-  std::vector<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
+  const kernels::Reused<Eigen::Vector3f> known = models::estimate_normals(points, index, part.neighbours, workers, asked);
+  kernels::Reused<Eigen::Vector3f> normals(points.size(), Eigen::Vector3f::Zero());
   for (std::size_t k = 0; k < known.size(); ++k) normals[part.points.index()[k]] = known[k];
   points.set_normals(std::move(normals));
 }

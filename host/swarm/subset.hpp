@@ -11,6 +11,7 @@
 #include "host/models/working_points.hpp"
 #include "host/swarm/random.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -18,14 +19,14 @@ namespace swarmfit::swarm {
 /// evenly. All finite points where there are no more. Parts of different `number` are drawn independently. `workers`, here and below, may
 /// be null: whose threads share the work.
 inline constexpr std::uint32_t kSearchedPart = 0, kThinnedPart = 1;
-std::vector<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
-                                     kernels::FitnessEvaluator* workers = nullptr);
+kernels::Reused<std::uint32_t> draw_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number, std::size_t size,
+                                         kernels::FitnessEvaluator* workers = nullptr);
 
 /// The same of a cloud whose points are worth the less the more `spread`, one a point and >= 1, says their noise is: each is drawn with a
 /// probability that falls as 1 / spread, so that what a model saves on them is, on average, counted in units of each point's own noise.
 /// `size` of them on average, each by itself.
-std::vector<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
-                                            std::size_t size, std::span<const float> spread);
+kernels::Reused<std::uint32_t> draw_steady_part(const models::WorkingPoints& points, const Random& random, std::uint32_t number,
+                                                std::size_t size, std::span<const float> spread);
 
 /// Rows of a cloud, copied as they are: a cloud of its own.
 class Rows {
@@ -39,7 +40,7 @@ class Rows {
   PointsView::Scalar scalar_;
   int dimension_;
   std::size_t width_;  // bytes of a row
-  std::vector<std::byte> bytes_;
+  kernels::Reused<std::byte> bytes_;
 };
 
 /// What a swarm searches on while it looks around: a part of the cloud in Morton order, in which neighbours are neighbours in space.
@@ -60,7 +61,7 @@ class Subset {
   void gather(std::span<const float> all, std::vector<float>& values) const;
 
  private:
-  std::vector<std::uint32_t> index_;
+  kernels::Reused<std::uint32_t> index_;
   Rows rows_;
 };
 

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <utility>
+
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -33,6 +36,16 @@ Swarm::Swarm(const models::ModelSpace& space, const Settings& settings, const Ra
   if (space.free_normal() > 0 && settings.renewal_share == 0) together_.emplace(static_cast<std::size_t>(space.free_normal()), m);
 }
 
+template <class Body>
+void Swarm::for_particles(const Body& body) const {
+  const std::size_t count = positions_.size(), samples = 2 * space_.samples_at_once();
+  kernels::FitnessEvaluator* const workers = this->workers();
+  const std::size_t at_once = workers == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 32;
+  const auto some = [&](std::size_t k) { body(k * at_once, std::min(count, (k + 1) * at_once)); };
+  if (workers == nullptr) return some(0);
+  workers->share_out((count + at_once - 1) / at_once, std::cref(some));
+}
+
 bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const models::Position> seeds) {
   round_ = round;
   steps_ = 0;
@@ -44,11 +57,11 @@ bool Swarm::start(const Sampler& sampler, std::uint32_t round, std::span<const m
   own_best_.assign(m, {});
   own_fitness_.assign(m, std::numeric_limits<double>::infinity());
   const auto local = static_cast<std::size_t>(settings_.local_share * static_cast<double>(m));
-  std::vector<std::uint8_t> placed(m, 1);
+  kernels::Reused<std::uint8_t> placed(m, 1);
   const std::size_t seeded = std::min(seeds.size(), m);
   std::copy_n(seeds.begin(), seeded, positions_.begin());
   for_particles([&](std::size_t first, std::size_t last) {
-    std::vector<Sampler::Ask> asks;
+    kernels::Reused<Sampler::Ask> asks;
     for (std::size_t j = std::max(first, seeded); j < last; ++j) asks.push_back({static_cast<std::uint32_t>(j), j < local});
     put_at_samples(sampler, asks, std::span(placed).subspan(last - asks.size(), asks.size()));
   });
@@ -72,7 +85,7 @@ Expected<> Swarm::step(Landscape& landscape, const Sampler& sampler, double scal
 
 void Swarm::set_off() {
   const std::size_t starters = positions_.size(), m = velocities_.size();
-  std::vector<std::size_t> order(starters);
+  kernels::Reused<std::size_t> order(starters);
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (starters > m) {
     const auto last = order.begin() + static_cast<std::ptrdiff_t>(m);
@@ -117,7 +130,7 @@ void Swarm::remember() {
   }
   const bool first = list_.empty();
   list_.push_back({positions_[best], fitness_[best]});
-  if (list_.size() > static_cast<std::size_t>(settings_.roulette_length)) list_.pop_front();
+  if (list_.size() > static_cast<std::size_t>(settings_.roulette_length)) list_.erase(list_.begin());
   const double saving = scale_ - fitness_[best];
   if (first || still_since_ - fitness_[best] > settings_.still * std::max(saving, 0.0)) {
     still_steps_ = 0;
@@ -128,7 +141,7 @@ void Swarm::remember() {
 const models::Position& Swarm::attractor(std::size_t particle) const {
   if (settings_.topology == Topology::roulette) {
     const auto word = random_.words(Draw::roulette, round_, static_cast<std::uint32_t>(steps_), static_cast<std::uint32_t>(particle))[0];
-    std::vector<double> shares(list_.size());
+    kernels::Reused<double> shares(list_.size());
     std::transform(list_.begin(), list_.end(), shares.begin(), [](const GlobalBest& g) { return g.fitness; });
     return list_[roulette(shares, Random::unit(word))].position;
   }
@@ -147,17 +160,8 @@ kernels::FitnessEvaluator* Swarm::workers() const noexcept {
   return evaluator_ != nullptr && (worth_waking || evaluator_->shares(positions_.size())) ? evaluator_ : nullptr;
 }
 
-void Swarm::for_particles(const std::function<void(std::size_t, std::size_t)>& body) const {
-  const std::size_t count = positions_.size(), samples = 2 * space_.samples_at_once();
-  kernels::FitnessEvaluator* const workers = this->workers();
-  const std::size_t at_once = workers == nullptr ? count : space_.costly_samples() ? std::max<std::size_t>(8, samples) : 32;
-  const auto some = [&](std::size_t k) { body(k * at_once, std::min(count, (k + 1) * at_once)); };
-  if (workers == nullptr) return some(0);
-  workers->share_out((count + at_once - 1) / at_once, some);
-}
-
 void Swarm::put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask> asks, std::span<std::uint8_t> placed) {
-  std::vector<models::Position> thetas(asks.size());
+  kernels::Reused<models::Position> thetas(asks.size());
   sampler.draw(asks, round_, static_cast<std::uint32_t>(steps_), thetas, placed);
   for (std::size_t k = 0; k < asks.size(); ++k) {
     if (placed[k] != 0) positions_[asks[k].particle] = thetas[k];
@@ -167,11 +171,11 @@ void Swarm::put_at_samples(const Sampler& sampler, std::span<const Sampler::Ask>
 void Swarm::move(const Sampler& sampler) {
   if (together_) return fly_together();
   for_particles([&](std::size_t first, std::size_t last) {
-    std::vector<Sampler::Ask> asks;
+    kernels::Reused<Sampler::Ask> asks;
     for (std::size_t j = first; j < last; ++j) {
       if (is_renewed(j)) asks.push_back({static_cast<std::uint32_t>(j), (j & 1U) != 0 && settings_.local_share > 0});
     }
-    std::vector<std::uint8_t> placed(asks.size());
+    kernels::Reused<std::uint8_t> placed(asks.size());
     put_at_samples(sampler, asks, placed);
     for (std::size_t j = first, k = 0; j < last; ++j) {
       const bool asked = k < asks.size() && asks[k].particle == j;

@@ -3,8 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,6 +13,7 @@
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/settings.hpp"
 #include "kernels/hyperplane_flight.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -50,7 +49,7 @@ class Swarm {
   double saving() const noexcept { return list_.empty() ? 0.0 : scale_ - list_.back().fitness; }
   double best_fitness() const noexcept { return list_.back().fitness; }
   /// The last n global bests, oldest first.
-  const std::deque<GlobalBest>& global_bests() const noexcept { return list_; }
+  std::span<const GlobalBest> global_bests() const noexcept { return list_; }
   /// Where particles were scored last, or will be first, and with what fitness.
   std::span<const models::Position> positions() const noexcept { return positions_; }
   std::span<const double> fitness() const noexcept { return fitness_; }
@@ -75,7 +74,8 @@ class Swarm {
   /// Whose threads share the work on so many particles, or null.
   kernels::FitnessEvaluator* workers() const noexcept;
   /// body(first, last) for runs of particles, side by side. What it does with one particle must not matter to another.
-  void for_particles(const std::function<void(std::size_t, std::size_t)>& body) const;
+  template <class Body>
+  void for_particles(const Body& body) const;
   const models::Position& attractor(std::size_t particle) const;
 
   const models::ModelSpace& space_;
@@ -88,10 +88,10 @@ class Swarm {
   int still_steps_ = 0;
   double scale_ = 0;
   double still_since_ = 0;  // fitness of the global best when it last moved
-  std::vector<models::Position> positions_, velocities_, own_best_;
-  std::vector<double> fitness_, own_fitness_;
+  kernels::Reused<models::Position> positions_, velocities_, own_best_;
+  kernels::Reused<double> fitness_, own_fitness_;
   std::optional<kernels::HyperplaneFlight> together_;
-  std::deque<GlobalBest> list_;
+  kernels::Reused<GlobalBest> list_;
 };
 
 }  // namespace swarmfit::swarm

@@ -8,6 +8,7 @@
 
 #include "host/swarm/deflation.hpp"
 #include "host/swarm/problem.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -35,7 +36,7 @@ class Unexplained {
 
  private:
   const Problem& problem_;
-  std::vector<float> caps_, part_caps_;
+  kernels::Reused<float> caps_, part_caps_;
   Near near_;
 };
 

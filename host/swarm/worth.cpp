@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "host/swarm/swarm.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 namespace {
@@ -69,7 +70,7 @@ double Worth::gathered(const Candidate& candidate) const {
   if (problem_.points.dimension() != 3) return 1;
   const float half = 0.5F * problem_.tau;
   double all = 0, inner = 0;
-  std::vector<float> room;
+  kernels::Reused<float> room;
   const std::span<const float> distances = problem_.levelled(candidate.distances, room);
   for (const std::uint32_t i : problem_.part.index()) {
     if (!(candidate.distances[i] < left_.caps()[i])) continue;
@@ -147,7 +148,7 @@ bool Worth::is_cornered(const Candidate& candidate) const {
   const auto own = [&](std::uint32_t i) { return candidate.distances[i] < left_.caps()[i]; };
   const auto off = [&](const Eigen::Vector3d& at) { return problem_.space(candidate.kind).outward(candidate.theta, at).norm() - radius; };
   double apart = 0, square = 0;
-  std::vector<std::pair<double, double>> near;
+  kernels::Reused<std::pair<double, double>> near;
   for (std::size_t place = 0; place < index.size(); ++place) {
     if (!own(index[place])) continue;
     const Eigen::Vector3d at = problem_.points.point<3>(index[place]);
@@ -171,14 +172,14 @@ bool Worth::is_cornered(const Candidate& candidate) const {
 }
 
 double Worth::bare_saving(std::span<const float> caps, std::span<const float> distances) const {
-  std::vector<float> caps_room, room;
+  kernels::Reused<float> caps_room, room;
   return saved(problem_.levelled(caps, caps_room), problem_.levelled(distances, room));
 }
 
 Expected<> Worth::choose(const Swarm& swarm, Candidate& candidate) const {
   // Neighbours on the ring know alike: one of each stretch is enough.
   const std::size_t particles = swarm.own_bests().size();
-  std::vector<models::Placed> known{{&problem_.space(candidate.kind), swarm.best()}};
+  kernels::Reused<models::Placed> known{{&problem_.space(candidate.kind), swarm.best()}};
   for (std::size_t k = 0; k < kStretches; ++k) {
     const std::size_t first = k * particles / kStretches, last = (k + 1) * particles / kStretches;
     const auto stretch = swarm.own_fitness().subspan(first, last - first);
@@ -188,7 +189,7 @@ Expected<> Worth::choose(const Swarm& swarm, Candidate& candidate) const {
   }
   const auto distances = measure(problem_.part_ground, known);
   if (!distances) return tl::unexpected(distances.error());
-  std::vector<double> savings(known.size());
+  kernels::Reused<double> savings(known.size());
   problem_.evaluator.share_out(known.size(),
                                [&](std::size_t m) { savings[m] = saving_along(candidate.kind, known[m].theta, (*distances)[m]); });
   const auto most = std::max_element(savings.begin(), savings.end());

@@ -58,7 +58,7 @@ void PointStore::assign(const PointsView& points) {
   most_cap_ = 0;
   bounds_current_ = false;
   apart_ = false;
-  std::vector<Chunk> chunks((count_ + kChunkRows - 1) / kChunkRows);
+  Reused<Chunk> chunks((count_ + kChunkRows - 1) / kChunkRows);
   for_each_task(chunks.size(), [&](std::size_t chunk) {
     Chunk summary;
     visit_chunk(points, chunk, [&](std::size_t, const auto& x) {
@@ -155,8 +155,8 @@ std::optional<std::size_t> PointStore::bad_cap(std::span<const float> caps) cons
 
 void PointStore::set_caps(std::span<const float> caps) {
   bounds_current_ = false;
-  std::vector<float> most((finite_ + kChunkRows - 1) / kChunkRows);
-  std::vector<std::size_t> costly(most.size());
+  Reused<float> most((finite_ + kChunkRows - 1) / kChunkRows);
+  Reused<std::size_t> costly(most.size());
   for_each_task(most.size(), [&](std::size_t chunk) {
     const std::size_t first = chunk * kChunkRows, last = std::min(finite_, first + kChunkRows);
     float* const kept = all_.caps.data();
