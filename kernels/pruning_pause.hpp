@@ -9,19 +9,26 @@ namespace swarmfit::kernels {
 class PruningPause {
  public:
   /// New points or caps: what was learnt is void.
-  void forget() noexcept { left_ = last_ = 0; }
+  void forget() noexcept {
+    left_ = last_ = 0;
+    proven_ = false;
+  }
   /// Asked once a swarm.
   bool now() noexcept { return left_ == 0 || left_-- == 0; }
+  /// Did it pay the last time?
+  bool proven() const noexcept { return proven_; }
   /// `share` of the residuals that a pruned swarm computed; above `poor`, both in [0, 1], it does not pay.
   void note(double share, double poor) noexcept {
     last_ = share > poor ? std::clamp(2 * last_, kFirst, kLongest) : 0;
     left_ = last_;
+    proven_ = share <= poor;
   }
 
  private:
   static constexpr int kFirst = 4, kLongest = 32;
   int left_ = 0;  ///< swarms to go before it is tried again
   int last_ = 0;
+  bool proven_ = false;
 };
 
 }  // namespace swarmfit::kernels

@@ -26,7 +26,7 @@
 /// For LeakSanitizer, where there is one: OpenCV takes an image's pixels first and then what holds them, and where that fails they are
 /// lost.
 extern "C" __attribute__((visibility("default"))) const char* __lsan_default_suppressions();
-extern "C" const char* __lsan_default_suppressions() { return "leak:cv::Mat::create\n"; }
+extern "C" const char* __lsan_default_suppressions() { return "leak:cv::Mat::create\nleak:cv::_OutputArray::create\n"; }
 
 namespace swarmfit {
 namespace {

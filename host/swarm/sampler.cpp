@@ -22,24 +22,25 @@ Sampler::Sampler(const models::WorkingPoints& points, std::span<const std::uint3
                  const models::ModelSpace& space, const Random& random)
     : points_(points), space_(space), random_(random), candidates_(candidates), neighbours_(neighbours), live_(candidates.size()) {
   std::iota(live_.begin(), live_.end(), 0U);
-  alive_.assign(candidates.size(), 1);
+  if (!neighbours.empty()) alive_.assign(candidates.size(), 1);
 }
 
 template <class Stays>
 bool Sampler::leave_out(const Stays& stays, std::size_t enough) {
-  live_.resize(candidates_.size());
+  const auto all = static_cast<std::uint32_t>(candidates_.size());
+  live_.resize(all);
+  std::uint32_t* const live = live_.data();
   std::size_t kept = 0;
-  for (std::uint32_t place = 0; place < candidates_.size(); ++place) {
-    const bool alive = stays(place);
-    alive_[place] = alive ? 1 : 0;
-    live_[kept] = place;  // overwritten by the next if it is not alive
-    kept += alive ? 1 : 0;
+  for (std::uint32_t place = 0; place < all; ++place) {
+    live[kept] = place;  // overwritten by the next if it is not alive
+    kept += stays(place) ? 1 : 0;
   }
+  for (std::uint32_t place = 0; place < alive_.size(); ++place) alive_[place] = stays(place) ? 1 : 0;
   live_.resize(kept);
   if (live_.size() >= enough) return true;
   live_.resize(candidates_.size());
   std::iota(live_.begin(), live_.end(), 0U);
-  alive_.assign(candidates_.size(), 1);
+  alive_.assign(alive_.size(), 1);
   return false;
 }
 

@@ -53,7 +53,7 @@ class Sampler {
   std::span<const std::uint32_t> candidates_;
   const models::Neighbours& neighbours_;
   kernels::Reused<std::uint32_t> live_;  // places in candidates_
-  kernels::Reused<std::uint8_t> alive_;  // one a candidate
+  kernels::Reused<std::uint8_t> alive_;  // one a candidate, where neighbours are known
 };
 
 }  // namespace swarmfit::swarm

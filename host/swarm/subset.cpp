@@ -31,17 +31,20 @@ struct Coded {
   std::uint32_t index;
 };
 
-/// Sorts by code; what has the same stays in its order. A digit of so many bits at a time, from the lowest.
+/// Sorts by code; what has the same stays in its order. A digit of so many bits at a time, from the lowest, all of them counted before.
 template <int DigitBits, class Code>
 void sort_by_digits(std::vector<Coded<Code>>& coded, int bits) {
-  constexpr std::size_t kDigits = std::size_t{1} << DigitBits;
+  constexpr std::size_t kDigits = std::size_t{1} << DigitBits, kMostPasses = (8 * sizeof(Code) + DigitBits - 1) / DigitBits;
+  const auto passes = static_cast<std::size_t>((bits + DigitBits - 1) / DigitBits);
+  const auto digit = [](Code code, std::size_t pass) { return static_cast<std::size_t>(code >> (pass * DigitBits)) & (kDigits - 1); };
+  std::array<std::array<std::uint32_t, kDigits>, kMostPasses> at{};
+  for (const Coded<Code>& one : coded) {
+    for (std::size_t pass = 0; pass < passes; ++pass) ++at[pass][digit(one.code, pass)];
+  }
   kernels::Reused<Coded<Code>> room(coded.size());
-  for (int shift = 0; shift < bits; shift += DigitBits) {
-    std::array<std::uint32_t, kDigits> at{};
-    const auto digit = [&](const Coded<Code>& one) { return (one.code >> shift) & (kDigits - 1); };
-    for (const Coded<Code>& one : coded) ++at[digit(one)];
-    std::exclusive_scan(at.begin(), at.end(), at.begin(), 0U);
-    for (const Coded<Code>& one : coded) room[at[digit(one)]++] = one;
+  for (std::size_t pass = 0; pass < passes; ++pass) {
+    std::exclusive_scan(at[pass].begin(), at[pass].end(), at[pass].begin(), 0U);
+    for (const Coded<Code>& one : coded) room[at[pass][digit(one.code, pass)]++] = one;
     coded.swap(room);
   }
 }
@@ -55,7 +58,7 @@ void sort_by_code(std::vector<Coded<Code>>& coded, int bits) {
 /// Of what takes a thread some nanoseconds each: a multiple of 64 of them are taken at a time.
 template <class Some>
 void share(kernels::FitnessEvaluator* workers, std::size_t count, Some&& some) {
-  constexpr std::size_t kRange = 3072, kFew = 4095;
+  constexpr std::size_t kRange = 1024, kFew = 4095;
   common::in_ranges(workers, count, kRange, kFew, some);
 }
 
