@@ -158,7 +158,7 @@ Expected<std::size_t> FitCall::rehearse(const FitOptions& options, kernels::Fitn
 
 Expected<FitResult> FitCall::run(const PointsView& points, const std::vector<Model>& warm_start) {
   if (auto done = take(points); !done) return tl::unexpected(done.error());
-  if (auto done = look_closely(); !done) return tl::unexpected(done.error());
+  if (auto done = choose_part(); !done) return tl::unexpected(done.error());
   FitResult result;
   if (auto done = settle_threshold(result); !done) return tl::unexpected(done.error());
   resolve(kinds_, options_, whole_.finite_count(), result.threshold);
@@ -194,7 +194,7 @@ Expected<> FitCall::thin() {
   return {};
 }
 
-Expected<> FitCall::look_closely() {
+Expected<> FitCall::choose_part() {
   part_searched_ = settings().searches_part(working().finite_count());
   if (options_.noise != Noise::none) depth_ = near_depth(working());
   spread_ = spread_of(options_.noise, working(), depth_);

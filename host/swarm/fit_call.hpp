@@ -61,7 +61,7 @@ class FitCall {
   Expected<> take(const PointsView& points);
   Expected<> thin();
   /// The part that is looked at closely, and what each point's noise is.
-  Expected<> look_closely();
+  Expected<> choose_part();
   /// Is that the search's to do, when it has taken the planes that stand out? An estimate of the threshold may ask for it before.
   bool looks_later() const;
   /// Given, or from the data; then some models are known.

@@ -212,7 +212,8 @@ Settings resolve(const FitOptions& options, std::size_t finite_points, double th
   constexpr double kStillOnPart = 0.01;
   const bool on_part = s.searches_part(finite_points);
   if (on_part) {
-    const bool flat = options.model == ModelType::plane;
+    // Of several planes one that is missed is found next; who wants but one wants the best.
+    const bool flat = options.model == ModelType::plane && options.max_models != 1;
     s.stall = flat ? kFlatStallOnPart : kStallOnPart;
     s.patience = kPatienceOnPart;
     s.still = kStillOnPart;
