@@ -15,9 +15,9 @@ class PruningPause {
   }
   /// Asked once a swarm.
   bool now() noexcept { return left_ == 0 || left_-- == 0; }
-  /// Did it pay the last time?
+  /// Did it pay the last time, since when nothing new was learnt?
   bool proven() const noexcept { return proven_; }
-  /// `share` of the residuals that a pruned swarm computed; above `poor`, both in [0, 1], it does not pay.
+  /// `share` of the residuals that a pruned swarm, or the part of it that was to tell, computed; above `poor`, both in [0, 1], it does not pay.
   void note(double share, double poor) noexcept {
     last_ = share > poor ? std::clamp(2 * last_, kFirst, kLongest) : 0;
     left_ = last_;

@@ -16,22 +16,32 @@ class Spares {
  public:
   /// Null while a thread ends: what ends after this frees its own.
   static Spares* of_thread() noexcept {
+    if (ended()) return nullptr;
     thread_local Spares spares;
-    return ended() ? nullptr : &spares;
+    return &spares;
   }
   ~Spares() { ended() = true; }
   Spares(const Spares&) = delete;
   Spares& operator=(const Spares&) = delete;
 
-  std::vector<T> take() noexcept { return count_ > 0 ? std::move(kept_[--count_]) : std::vector<T>(); }
+  std::vector<T> take() noexcept {
+    if (count_ == 0) return {};
+    std::vector<T>& last = kept_[--count_];
+    bytes_ -= bytes_of(last);
+    return std::move(last);
+  }
   void keep(std::vector<T>&& done) noexcept {
-    if (done.capacity() == 0 || done.capacity() * sizeof(T) > kMostBytes || count_ == kept_.size()) return;
+    const std::size_t bytes = bytes_of(done);
+    if (bytes == 0 || bytes > kMostBytes || bytes_ + bytes > kMostInAll || count_ == kept_.size()) return;
     done.clear();
+    bytes_ += bytes;
     kept_[count_++] = std::move(done);
   }
 
  private:
-  static constexpr std::size_t kMostBytes = std::size_t{4} << 20;  // what is larger goes back to the system: it may be all there is
+  // What is larger, or more, goes back to the system: it may be all there is.
+  static constexpr std::size_t kMostBytes = std::size_t{4} << 20, kMostInAll = std::size_t{16} << 20;
+  static std::size_t bytes_of(const std::vector<T>& one) noexcept { return one.capacity() * sizeof(T); }
 
   Spares() = default;
   static bool& ended() noexcept {
@@ -40,11 +50,11 @@ class Spares {
   }
 
   std::array<std::vector<T>, 48> kept_;
-  std::size_t count_ = 0;
+  std::size_t count_ = 0, bytes_ = 0;
 };
 
 /// A vector that begins with the memory of one that this thread is done with, and leaves its own to the next. For what lives no longer than
-/// a call.
+/// a call. What is moved from by assignment has the other's elements: they are swapped.
 template <class T>
 class Reused : public std::vector<T> {
  public:

@@ -12,6 +12,7 @@
 
 #include "host/models/working_points.hpp"
 #include "host/swarm/local_labels.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit {
 namespace {

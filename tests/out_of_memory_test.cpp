@@ -119,8 +119,10 @@ TEST_P(FitOutOfMemory, IsAnErrorAndTheFitterGoesOn) {
   // What fails there is told by the fit: nothing may come out of it.
   for (const long request : {1, 2, 5, 20, 60, 200, 1000}) {
     for (const bool stays_out : {false, true}) {
-      const Failing one(request, stays_out);
-      fitter->prepare();
+      std::jthread([&] {
+        const Failing one(request, stays_out);
+        fitter->prepare();
+      }).join();
     }
   }
   const auto after = fitter->fit(points), fresh = fit(points, options);

@@ -59,9 +59,12 @@ TEST(Reused, MemoryGoesAlongWithWhatIsMovedAndNotWithWhatIsCopied) {
 }
 
 TEST(Reused, WhatIsLargeGoesBackToTheSystem) {
+  struct Wide {
+    double value;
+  };
   const long before = Memory::live;
   {
-    const Reused<double> large(std::size_t{1} << 20);
+    const Reused<Wide> large(std::size_t{1} << 20);
     EXPECT_EQ(Memory::live, before + 1);
   }
   EXPECT_EQ(Memory::live, before);

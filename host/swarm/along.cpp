@@ -22,7 +22,7 @@ constexpr double kMostly = 0.6;          // share of a model's points that must 
 constexpr int kPasses = 2;               // who lies along a model is asked again once it has moved
 
 /// Input indices of points near a model that nothing else explains better, kMost at most, evenly over the input. `left`: what others leave.
-std::vector<std::uint32_t> surroundings(const Ground& whole, std::span<const float> distances, std::span<const float> left) {
+kernels::Reused<std::uint32_t> surroundings(const Ground& whole, std::span<const float> distances, std::span<const float> left) {
   kernels::Reused<std::uint32_t> near, drawn;
   for (std::size_t i = 0; i < distances.size(); ++i) {
     const float allowed = whole.allowed_at(i), d = distances[i];
@@ -35,7 +35,7 @@ std::vector<std::uint32_t> surroundings(const Ground& whole, std::span<const flo
 }
 
 /// Cosines of the angles between points' normals and a model's; 0 where a normal is not known.
-std::vector<double> cosines_of(const Ground& part, std::span<const Eigen::Vector3f> normals, const models::Position& theta) {
+kernels::Reused<double> cosines_of(const Ground& part, std::span<const Eigen::Vector3f> normals, const models::Position& theta) {
   kernels::Reused<double> cosines(part.size());
   for (std::size_t k = 0; k < cosines.size(); ++k) {
     const Eigen::Vector3d outward = part.space.outward(theta, part.points.point<3>(part.index(k)));
@@ -46,7 +46,7 @@ std::vector<double> cosines_of(const Ground& part, std::span<const Eigen::Vector
 
 /// Caps of the points by which a model is to be refined: what they may be off, or 0 of those that do not lie along it. None where too few
 /// do.
-std::vector<float> caps_along(const Ground& part, std::span<const double> cosines, std::span<const float> distances) {
+kernels::Reused<float> caps_along(const Ground& part, std::span<const double> cosines, std::span<const float> distances) {
   kernels::Reused<float> caps(cosines.size());
   std::size_t own = 0, along = 0;
   for (std::size_t k = 0; k < caps.size(); ++k) {

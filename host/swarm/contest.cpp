@@ -18,7 +18,7 @@ constexpr double kAsGood = 0.95;                   // times what the faces of a 
 constexpr double kClearly = 1.1;                   // times what a flat model is worth: a curved one must be worth more
 
 /// The caps of those points that a model explains; 0 elsewhere.
-std::vector<float> own_caps(std::span<const float> caps, std::span<const float> distances) {
+kernels::Reused<float> own_caps(std::span<const float> caps, std::span<const float> distances) {
   kernels::Reused<float> own(caps.size());
   for (std::size_t i = 0; i < caps.size(); ++i) own[i] = distances[i] < caps[i] ? caps[i] : 0.0F;
   return own;

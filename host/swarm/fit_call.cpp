@@ -130,15 +130,16 @@ Expected<> EvaluatorPair::make() {
   return {};
 }
 
-FitCall::FitCall(const FitOptions& options, std::vector<Kind>& kinds, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair,
-                 const SwarmObserver& observer, const ModelCallback& on_model, Limits limits)
+FitCall::FitCall(const FitOptions& options, std::shared_ptr<std::vector<Kind>> kinds, kernels::FitnessEvaluator& evaluator,
+                 EvaluatorPair& pair, const SwarmObserver& observer, const ModelCallback& on_model, Limits limits)
     : options_(options),
       evaluator_(evaluator),
       pair_(pair),
       on_model_(on_model),
       watch_{observer, 0},
       limits_(std::move(limits)),
-      kinds_(kinds) {}
+      kept_kinds_(std::move(kinds)),
+      kinds_(*kept_kinds_) {}
 
 Expected<std::size_t> FitCall::rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair) {
   constexpr std::size_t kPoints = 64;
@@ -150,8 +151,8 @@ Expected<std::size_t> FitCall::rehearse(const FitOptions& options, kernels::Fitn
   const ModelCallback untold;
   Limits limits;
   limits.max_models = 1;
-  std::vector<Kind> kinds = make_kinds(small);
-  const auto result = FitCall(small, kinds, evaluator, pair, nobody, untold, limits).run({values, dimension(options.model)}, {});
+  auto kinds = std::make_shared<std::vector<Kind>>(make_kinds(small));
+  const auto result = FitCall(small, std::move(kinds), evaluator, pair, nobody, untold, limits).run({values, dimension(options.model)}, {});
   if (!result) return tl::unexpected(result.error());
   return result->models.size();
 }
@@ -277,7 +278,7 @@ Expected<> FitCall::finish(Found found, FitResult& result) {
     if (auto done = refine_along(ground, found.models, found.hidden); !done) return done;
   }
   if (!found.hidden_owns) found.hidden.clear();
-  result.labels = std::move(found.labels);
+  result.labels.assign(found.labels.begin(), found.labels.end());
   return settle(ground, found.models, found.hidden, found.corners, result);
 }
 

@@ -14,6 +14,7 @@
 #include "host/swarm/pilot.hpp"
 #include "host/swarm/subset.hpp"
 #include "kernels/fitness_evaluator.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 
@@ -33,9 +34,9 @@ class EvaluatorPair {
 
 class FitCall {
  public:
-  /// `options` are valid, and `kinds` what make_kinds() makes of them; their settings are resolved here. All of it must outlive this.
+  /// `options` are valid, and `kinds` what make_kinds() makes of them; their settings are resolved here. All else must outlive this.
   /// `observer` and `on_model` may be empty.
-  FitCall(const FitOptions& options, std::vector<Kind>& kinds, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair,
+  FitCall(const FitOptions& options, std::shared_ptr<std::vector<Kind>> kinds, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair,
           const SwarmObserver& observer, const ModelCallback& on_model, Limits limits);
 
   /// A fit of one model of the first kind to a few made-up points, of which nothing stays but that code and memory have been touched.
@@ -81,6 +82,7 @@ class FitCall {
   const ModelCallback& on_model_;
   Watch watch_;
   Limits limits_;
+  const std::shared_ptr<std::vector<Kind>> kept_kinds_;
   std::vector<Kind>& kinds_;
   models::WorkingPoints whole_, thin_;
   std::optional<Rows> thin_rows_;

@@ -1,6 +1,7 @@
 // The public face of the fit: options are checked and the back end is kept here; fit_call.cpp does the work.
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -13,10 +14,17 @@
 #include "kernels/evaluators.hpp"
 
 namespace swarmfit {
+namespace {
+
+std::shared_ptr<std::vector<swarm::Kind>> kinds_of(const FitOptions& options) {
+  return std::make_shared<std::vector<swarm::Kind>>(swarm::make_kinds(options));
+}
+
+}  // namespace
 
 struct Fitter::State {
   FitOptions options;
-  std::vector<swarm::Kind> kinds;  // that they ask for
+  std::shared_ptr<std::vector<swarm::Kind>> kinds;  // that they ask for; a fit under way keeps those it began with
   std::shared_ptr<models::OwnWatch> watch = std::make_shared<models::OwnWatch>();
   std::unique_ptr<kernels::FitnessEvaluator> evaluator;
   std::string reason;
@@ -40,9 +48,10 @@ struct Fitter::State {
       if (made.error().kind == kernels::Failure::Kind::invalid) error.kind = Error::Kind::invalid_option;
       return tl::unexpected(std::move(error));
     }
+    auto asked = kinds_of(wanted);  // nothing fails from here on
     evaluator = std::move(made->evaluator);
     reason = std::move(made->reason);
-    kinds = swarm::make_kinds(wanted);
+    kinds = std::move(asked);
     options = std::move(wanted);
     return {};
   }
@@ -65,7 +74,7 @@ Expected<Fitter> Fitter::create(const FitOptions& options) try {
 Fitter FitterParts::assemble(const FitOptions& options, std::unique_ptr<kernels::FitnessEvaluator> evaluator, std::string reason) {
   auto state = std::make_unique<Fitter::State>();
   state->options = options;
-  state->kinds = swarm::make_kinds(options);
+  state->kinds = kinds_of(options);
   state->evaluator = std::move(evaluator);
   state->reason = std::move(reason);
   return Fitter(std::move(state));
@@ -86,7 +95,7 @@ Expected<> Fitter::set_options(const FitOptions& options) try {
     return fail(Error::Kind::invalid_option, fmt::format("pipeline_cache is {}, must stay {}", options.pipeline_cache, old.pipeline_cache));
   if (options.own || old.own) return state_->open(options);
   FitOptions wanted = options;
-  state_->kinds = swarm::make_kinds(options);
+  state_->kinds = kinds_of(options);
   state_->options = std::move(wanted);
   return {};
 } catch (...) {

@@ -18,6 +18,7 @@
 #include "host/swarm/share_out.hpp"
 #include "host/swarm/unexplained.hpp"
 #include "host/swarm/worth.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 

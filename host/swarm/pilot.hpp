@@ -15,6 +15,7 @@
 #include "host/swarm/landscape.hpp"
 #include "host/swarm/problem.hpp"
 #include "host/swarm/unexplained.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 

@@ -14,6 +14,7 @@
 #include "host/swarm/pilot.hpp"
 #include "host/swarm/problem.hpp"
 #include "host/swarm/unexplained.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
 

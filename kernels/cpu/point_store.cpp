@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "kernels/cpu/tasks.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::kernels::cpu {
 namespace {

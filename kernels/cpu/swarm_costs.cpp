@@ -28,7 +28,8 @@ constexpr std::size_t kGroupsPerThread = 2, kFairGroup = 32, kLeastGroup = 8;
 constexpr std::size_t kLeastFlat = 32;
 /// Share of the residuals above which it does not pay: those of lines and planes are cheap.
 constexpr double kPoorFlat = 0.7, kPoorRound = 0.8;
-/// Where nothing tells yet whether it pays, so many models of a swarm are to tell; of one that is this many times as large.
+/// Where nothing tells yet whether it pays, so many models of a swarm are to tell, the last, which local samples have no part in; of one
+/// that is this many times as large for each thread, as few threads share the trial.
 constexpr std::size_t kTrial = 16, kTrialsInSwarm = 4;
 
 std::size_t groups_of(std::size_t models) { return (models + kGroupModels - 1) / kGroupModels; }
@@ -124,16 +125,25 @@ std::uint64_t SwarmCosts::evaluate(PointStore& points, const CentredSwarm& swarm
   }
   const double poor = traits(swarm.kind).affine ? kPoorFlat : kPoorRound;
   const auto prune = [&](std::size_t first, std::size_t models) {
-    const std::uint64_t touched = evaluate_open(points, part_of(swarm, first, models), summing, costs.subspan(first, models));
-    pause_.note(static_cast<double>(touched) / (static_cast<double>(points.costly()) * static_cast<double>(models)), poor);
-    return touched;
+    return evaluate_open(points, part_of(swarm, first, models), summing, costs.subspan(first, models));
   };
-  if (pause_.proven() || swarm.count < kTrialsInSwarm * kTrial) return prune(0, swarm.count);
-  const std::uint64_t tried = prune(0, kTrial);
-  const std::size_t rest = swarm.count - kTrial;
-  if (pause_.proven()) return tried + prune(kTrial, rest);
-  evaluate_all(points, part_of(swarm, kTrial, rest), summing, costs.subspan(kTrial));
-  return tried + points.costly() * rest;
+  const auto share = [&](std::uint64_t touched, std::size_t models) {
+    return static_cast<double>(touched) / (static_cast<double>(points.costly()) * static_cast<double>(models));
+  };
+  std::size_t rest = swarm.count;
+  std::uint64_t touched = 0;
+  if (!pause_.proven() && swarm.count >= kTrialsInSwarm * kTrial * workers()) {
+    rest -= kTrial;
+    touched = prune(rest, kTrial);
+    if (const double tried = share(touched, kTrial); tried > poor) {
+      pause_.note(tried, poor);
+      evaluate_all(points, part_of(swarm, 0, rest), summing, costs.first(rest));
+      return touched + points.costly() * rest;
+    }
+  }
+  touched += prune(0, rest);
+  pause_.note(share(touched, swarm.count), poor);
+  return touched;
 }
 
 bool SwarmCosts::prune_now(const PointStore& points, const CentredSwarm& swarm, const Summing& summing) {
