@@ -144,7 +144,7 @@ FitCall::FitCall(const FitOptions& options, std::shared_ptr<std::vector<Kind>> k
 Expected<std::size_t> FitCall::rehearse(const FitOptions& options, kernels::FitnessEvaluator& evaluator, EvaluatorPair& pair) {
   constexpr std::size_t kPoints = 64;
   constexpr models::SyntheticMix kOneModel{1, 9};
-  const kernels::Reused<float> values = models::synthetic_points(options.model, kPoints, options.seed, kOneModel);
+  const std::vector<float> values = models::synthetic_points(options.model, kPoints, options.seed, kOneModel);
   if (values.empty()) return std::size_t{0};
   const FitOptions small = rehearsal_of(options);
   const SwarmObserver nobody;

@@ -59,7 +59,7 @@ Expected<> ShareOut::search_further() {
   return {};
 }
 
-std::vector<models::Position> ShareOut::samples_of(std::span<const float> marks, int count, std::vector<models::Position> samples) {
+kernels::Reused<models::Position> ShareOut::samples_of(std::span<const float> marks, int count, kernels::Reused<models::Position> samples) {
   Sampler sampler(problem_.points, problem_.part.index(), problem_.neighbours, problem_.space(0), problem_.random);
   if (!sampler.keep_to(marks)) return {};
   const kernels::Reused<models::Position> drawn = sampler.draw_some(static_cast<std::uint32_t>(count), 2, pilot_.next_round());

@@ -46,7 +46,7 @@ class ShareOut {
   Expected<bool> regroup_one(std::size_t model);
   Expected<bool> regroup_two(std::size_t one, std::size_t other);
   /// `samples` and models through so many samples of the points of which marks are not 0; none where these are too few.
-  std::vector<models::Position> samples_of(std::span<const float> marks, int count, std::vector<models::Position> samples);
+  kernels::Reused<models::Position> samples_of(std::span<const float> marks, int count, kernels::Reused<models::Position> samples);
   /// What is told of a new model.
   Expected<> describe(std::size_t of, std::span<const std::uint16_t> labels, Model& model) const;
 
