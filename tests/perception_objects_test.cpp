@@ -58,6 +58,29 @@ TEST(Objects, TwoBoxesInLineWithAGapBetweenStayTwo) {
   expect_objects(perceive({{{-0.15, 0, 0.06}, {0.1, 0.04, 0.06}}, {{0.15, 0, 0.06}, {0.1, 0.04, 0.06}}}), 2);
 }
 
+TEST(Objects, TopsOfOneHeightToBothSidesOfAThingAreOfTwo) {
+  // The line between their middles is hidden, those between their ends are not: they are not one face.
+  expect_objects(
+      perceive(
+          {{{-0.15, 0.15, 0.05}, {0.08, 0.06, 0.05}}, {{0.15, -0.05, 0.05}, {0.08, 0.06, 0.05}}, {{0, -0.05, 0.13}, {0.068, 0.03, 0.13}}}),
+      3);
+}
+
+TEST(Objects, AVesselEndsAtItsRim) {
+  // Four walls, and a carton right behind them that is higher.
+  const auto scene = perceive({{{0, -0.15, 0.05}, {0.12, 0.005, 0.05}},
+                               {{0, 0.07, 0.05}, {0.12, 0.005, 0.05}},
+                               {{-0.12, -0.04, 0.05}, {0.005, 0.115, 0.05}},
+                               {{0.12, -0.04, 0.05}, {0.005, 0.115, 0.05}},
+                               {{0.02, 0.12, 0.12}, {0.1, 0.04, 0.12}}});
+  const auto near_wall = test::agreement(scene.rendering.truth, 2, scene.objects.of_point),
+             far_wall = test::agreement(scene.rendering.truth, 3, scene.objects.of_point),
+             carton = test::agreement(scene.rendering.truth, 6, scene.objects.of_point);
+  EXPECT_EQ(near_wall.label, far_wall.label);
+  EXPECT_NE(carton.label, far_wall.label);
+  EXPECT_GT(carton.precision, 0.95);
+}
+
 TEST(Objects, WhatHangsOnAThingIsPartOfIt) {
   const test::Box body{{0, 0, 0.1}, {0.06, 0.05, 0.1}};
   // In the air beside it, as thick as a good handle.

@@ -8,13 +8,14 @@
 namespace swarmfit::perception {
 namespace {
 
-constexpr int kInside = 4;             // [cells] from the border to where a patch's own normal is read
-constexpr double kFlat = 0.26;         // [rad] patches that meet at less go on in one another
-constexpr double kCrease = 0.52;       // [rad] a concave edge that counts in full
-constexpr double kCreaseWeight = 1.5;  // against 1 of a convex edge: two things touch along short borders
-constexpr float kUnbroken = 4;         // footprints between neighbouring cells of one surface at most
-constexpr double kRim = 30;            // [rad / m] convex, and bent more than this
-constexpr double kStepWeight = 0.5;
+constexpr int kInside = 4;                  // [cells] from the border to where a patch's own normal is read
+constexpr double kFlat = 0.26;              // [rad] patches that meet at less go on in one another
+constexpr double kCrease = 0.52;            // [rad] a concave edge that counts in full
+constexpr double kCreaseWeight = 2.5;       // against 1 of a convex edge: two things touch along short borders;
+constexpr double kRoughCreaseWeight = 1.5;  // where normals are unsteady there are creases that are none
+constexpr float kUnbroken = 4;              // footprints between neighbouring cells of one surface at most
+constexpr double kRim = 30;                 // [rad / m] convex, and bent more than this
+constexpr double kStepWeight = 1;
 constexpr double kStepSigmas = 4;
 constexpr int kReach = 6;        // [cells] holes between patches may be this wide
 constexpr float kNear = 0.035f;  // [m] patches this near are neighbours, though they say nothing of each other
@@ -100,7 +101,7 @@ double vote(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patc
     ++known;
   }
   const double crease = angle - (known > 0 ? bent / known : 0) * static_cast<double>(d.norm());
-  return crease < kFlat ? 1 : -kCreaseWeight * std::min(1.0, crease / kCrease);
+  return crease < kFlat ? 1 : -by_steadiness(coarse, kCreaseWeight, kRoughCreaseWeight) * std::min(1.0, crease / kCrease);
 }
 
 }  // namespace

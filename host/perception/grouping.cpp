@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 namespace swarmfit::perception {
@@ -13,14 +14,21 @@ constexpr double kFragmentCells = 60;     // smaller pieces are no objects of th
 constexpr double kFragmentShare = 0.08;   // of the larger one's cells
 constexpr double kHollow = -0.2;          // divergence below which a piece is the inside of something
 constexpr float kRim = 0.03f;             // [m] the inside of a vessel is not higher than its outside
+constexpr float kRimWidth = 0.02f;        // [m] between two parts of an inside
 constexpr double kRimCells = 8;           // [cells] least border of a hollow and its shell
 constexpr int kRimReach = 5;              // [cells] holes the border may have
+constexpr int kVessel = 30;               // [cells] down the image from the far wall of a vessel to the near rim, over its floor
+constexpr float kVesselWidth = 0.3f;      // [m] and that far in space
+constexpr float kSlackSigmas = 6;         // of a depth, that rims may be off by
 constexpr double kEnclosed = 0.8;         // of a basin's border
 constexpr float kBelowRim = 0.01f;        // [m] a basin's top is at least this far below that of what encloses it
 constexpr float kSameSurface = 0.978f;    // cosine of 12 degrees
 constexpr float kOffSurface = 0.012f;     // [m]
 constexpr float kBridge = 0.35f;          // [m] between the middles of two pieces of one surface
 constexpr std::size_t kBridgeCells = 25;  // smaller patches do not tell their surface
+constexpr std::size_t kSpread = 5;        // cells of a patch from which lines run to those of another
+constexpr int kOpenOfHidden = 8;          // so many cells must be hidden for each that is not
+constexpr double kHangingShare = 0.5;    // of what a piece hangs on, in cells: a handle is smaller
 constexpr float kInFront = 0.005f;        // [m]
 constexpr float kClear = 0.025f;          // [m] what is seen this far behind a piece's lower border does not carry it
 constexpr double kMostlyClear = 0.5;      // of the lower border of a piece that hangs
@@ -35,6 +43,19 @@ struct Piece {
   float top = 0;          // [m] along up
 };
 
+/// Between two pieces in the image, in cells of the one's border.
+struct Border {
+  double all = 0;
+  double near = 0;  ///< where the other is as near as a rim is wide
+  double rim = 0;   ///< where the other is as high as the one's top and no farther off: a rim that is seen from outside
+};
+
+/// What is seen along lines between two patches of one plane, in cells.
+struct Sight {
+  int hidden = 0;  ///< something before that plane
+  int open = 0;    ///< something in it or behind it
+};
+
 /// What lies right below a piece's lower border, in cells of the border.
 struct Footing {
   double all = 0;
@@ -45,8 +66,11 @@ struct Footing {
 
 class Assembly {
  public:
-  Assembly(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const Eigen::Vector3f& up, std::vector<int> parent)
-      : grid_(grid), coarse_(coarse), patches_(patches), up_(up), parent_(std::move(parent)) {}
+  Assembly(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const Eigen::Vector3f& up, double noise,
+           std::vector<int> parent)
+      : grid_(grid), coarse_(coarse), patches_(patches), up_(up), noise_(static_cast<float>(noise)), parent_(std::move(parent)) {
+    down_ = downwards();
+  }
 
   void absorb_fragments(const Contacts& contacts);
   void close_hollows();
@@ -68,17 +92,22 @@ class Assembly {
   }
   std::map<int, std::size_t> count_cells() const;
   std::map<int, Piece> describe() const;
-  std::map<std::pair<int, int>, double> measure_borders() const;
+  std::map<std::pair<int, int>, Border> measure_borders(const std::map<int, Piece>& pieces) const;
   Eigen::Vector2i downwards() const;
   std::map<int, Footing> find_footing() const;
   bool continues(const Patch& a, const Patch& b) const;
   bool hidden_between(std::size_t patch_a, std::size_t patch_b) const;
+  void look_between(std::uint32_t from, std::uint32_t to, Sight& sight) const;
+  void spread_cells();
 
   const PointGrid& grid_;
   const CoarseGrid& coarse_;
   const Patches& patches_;
   Eigen::Vector3f up_;
-  std::vector<int> parent_;  // one a patch: the piece it belongs to
+  float noise_;  // of a depth at one metre
+  Eigen::Vector2i down_;
+  std::vector<std::vector<std::uint32_t>> spread_;  // cells of each patch
+  std::vector<int> parent_;                         // one a patch: the piece it belongs to
 };
 
 std::map<int, std::size_t> Assembly::count_cells() const {
@@ -147,48 +176,68 @@ void Assembly::absorb_fragments(const Contacts& contacts) {
   }
 }
 
-/// Borders in the image between pieces, both ways; -1 is what is no piece.
-std::map<std::pair<int, int>, double> Assembly::measure_borders() const {
-  constexpr std::array<std::array<int, 2>, 4> kAround{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
-  std::map<std::pair<int, int>, double> borders;
-  const auto beside = [&](int u, int v, int o, int du, int dv) {
-    for (int reach = 1; reach <= kRimReach; ++reach) {
-      const int x = u + reach * du, y = v + reach * dv;
-      if (x < 0 || y < 0 || x >= coarse_.width || y >= coarse_.height) return -1;
-      const int other = owner(static_cast<std::size_t>(y * coarse_.width + x));
-      if (other >= 0) return other == o && reach > 1 ? -2 : other;
+/// Borders in the image between pieces, both ways; -1 is what is no piece. Of hollows also those to the near rim, that their floor, which
+/// may be as low as the table, parts from the wall that is seen.
+std::map<std::pair<int, int>, Border> Assembly::measure_borders(const std::map<int, Piece>& pieces) const {
+  const std::array<Eigen::Vector2i, 4> around{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
+  std::map<std::pair<int, int>, Border> borders;
+  const auto measure = [&](int u, int v, int o, const Piece& piece, const Eigen::Vector2i& step) {
+    const auto& p = coarse_.points[static_cast<std::size_t>(v * coarse_.width + u)];
+    const float slack = kSlackSigmas * noise_ * p.squaredNorm();
+    const int farthest = step == down_ && piece.divergence < kHollow ? kVessel : kRimReach;
+    for (int reach = 1; reach <= farthest; ++reach) {
+      const int x = u + reach * step.x(), y = v + reach * step.y();
+      if (x < 0 || y < 0 || x >= coarse_.width || y >= coarse_.height) break;
+      const auto to = static_cast<std::size_t>(y * coarse_.width + x);
+      const int other = owner(to);
+      if (other < 0) continue;
+      if (other == o) return;
+      const auto& q = coarse_.points[to];
+      const float apart = (p - q).norm();
+      const bool as_high = std::abs(up_.dot(q) - piece.top) < kRim + slack, farther = q.norm() >= p.norm() + kBelowRim + slack;
+      Border& border = borders[{o, other}];
+      border.near += apart < kRimWidth + slack ? 1 : 0;
+      border.rim += as_high && !farther && apart < kVesselWidth ? 1 : 0;
+      if (reach > kRimReach) break;
+      border.all += 1;
+      return;
     }
-    return -1;
+    borders[{o, -1}].all += 1;
   };
   for (int v = 0; v < coarse_.height; ++v)
     for (int u = 0; u < coarse_.width; ++u) {
       const int o = owner(static_cast<std::size_t>(v * coarse_.width + u));
       if (o < 0) continue;
-      for (const auto& [du, dv] : kAround)
-        if (const int other = beside(u, v, o, du, dv); other != o && other != -2) borders[{o, other}] += 1;
+      const Piece& piece = pieces.at(o);
+      for (const auto& step : around) measure(u, v, o, piece, step);
     }
   return borders;
 }
 
-/// The inside of a pot or cup goes with its outside: a hollow has a shell beside it, no lower; a basin lies within its rim.
+/// The inside of a pot or cup goes with its outside: the parts of a hollow lie side by side, and its shell is seen at its rim, before what is
+/// inside. What stands behind a rim, or before it but higher or lower, is something else. A basin lies within what encloses it.
 void Assembly::close_hollows() {
+  std::set<int> closed;  // hollows that have found their shells, which may look hollow still
   while (true) {
     const auto pieces = describe();
-    const auto borders = measure_borders();
+    const auto borders = measure_borders(pieces);
     std::map<int, double> around;
-    for (const auto& [pair, length] : borders) around[pair.first] += length;
+    for (const auto& [pair, border] : borders) around[pair.first] += border.all;
+    const auto is_hollow = [&](int piece) { return closed.count(piece) == 0 && pieces.at(piece).divergence < kHollow; };
     std::pair<int, int> best{-1, -1};
     double most = kRimCells;
-    for (const auto& [pair, length] : borders) {
-      if (pair.second < 0 || length <= most) continue;
+    for (const auto& [pair, border] : borders) {
+      if (pair.second < 0) continue;
       const auto &piece = pieces.at(pair.first), &other = pieces.at(pair.second);
-      const bool hollow = piece.divergence < kHollow && piece.top < other.top + kRim;
-      const bool basin = length > kEnclosed * around.at(pair.first) && piece.top < other.top - kBelowRim;
-      if (!hollow && !basin) continue;
+      const bool basin = border.all > kEnclosed * around.at(pair.first) && piece.top < other.top - kBelowRim;
+      const bool hollow = is_hollow(pair.first) && piece.top < other.top + kRim;
+      const double length = basin ? border.all : !hollow ? 0 : is_hollow(pair.second) ? border.near : border.rim;
+      if (length <= most) continue;
       most = length;
       best = pair;
     }
     if (best.first < 0) return;
+    if (!is_hollow(best.second) && pieces.at(best.second).divergence > -kHollow) closed.insert(best.second);
     join(best.second, best.first);
   }
 }
@@ -207,7 +256,6 @@ Eigen::Vector2i Assembly::downwards() const {
 }
 
 std::map<int, Footing> Assembly::find_footing() const {
-  const Eigen::Vector2i down = downwards();
   std::map<int, Footing> footing;
   for (int v = 0; v < coarse_.height; ++v)
     for (int u = 0; u < coarse_.width; ++u) {
@@ -216,7 +264,7 @@ std::map<int, Footing> Assembly::find_footing() const {
       if (o < 0) continue;
       Footing border;
       for (int reach = 1; reach <= kRimReach; ++reach) {
-        const int x = u + reach * down.x(), y = v + reach * down.y();
+        const int x = u + reach * down_.x(), y = v + reach * down_.y();
         if (x < 0 || y < 0 || x >= coarse_.width || y >= coarse_.height) break;
         const int other = owner(static_cast<std::size_t>(y * coarse_.width + x));
         if (other == o) break;  // no border
@@ -249,7 +297,8 @@ void Assembly::join_hanging(const Contacts& contacts) {
       for (const auto& [one, other] : {pair, std::pair{pair.second, pair.first}}) {
         const int a = parent_[static_cast<std::size_t>(one)], b = parent_[static_cast<std::size_t>(other)];
         const auto found = footing.find(a);
-        if (a == b || found == footing.end() || cells.at(a) >= cells.at(b)) continue;
+        if (a == b || found == footing.end()) continue;
+        if (static_cast<double>(cells.at(a)) >= kHangingShare * static_cast<double>(cells.at(b))) continue;
         const Footing& f = found->second;
         if (f.clear > kMostlyClear * f.all && f.stands < kHardlyStands * f.all && f.rests < kHardlyRests * f.all)
           touch[{a, b}] += contact.length;
@@ -267,29 +316,48 @@ bool Assembly::continues(const Patch& a, const Patch& b) const {
   return d.norm() < kBridge && std::abs(d.dot(a.normal)) < kOffSurface && std::abs(d.dot(b.normal)) < kOffSurface;
 }
 
-/// Whether all that is seen between two patches lies in front of the surface that would join them.
+/// Whether what is seen between two patches lies in front of the surface that would join them: from cells spread over the one to cells
+/// spread over the other, as a face is convex.
 bool Assembly::hidden_between(std::size_t patch_a, std::size_t patch_b) const {
-  const auto &pa = patches_.list[patch_a], &pb = patches_.list[patch_b];
-  const int owner_a = parent_[patch_a], owner_b = parent_[patch_b];
-  const int steps = std::max(1, static_cast<int>((pb.middle - pa.middle).norm()));
-  int hidden = 0, open = 0;
+  Sight sight;
+  for (const auto from : spread_[patch_a])
+    for (const auto to : spread_[patch_b]) look_between(from, to, sight);
+  return sight.hidden > 0 && sight.open * kOpenOfHidden <= sight.hidden;
+}
+
+void Assembly::look_between(std::uint32_t from, std::uint32_t to, Sight& sight) const {
+  const auto width = static_cast<std::uint32_t>(coarse_.width);
+  const Eigen::Vector2f a(static_cast<float>(from % width), static_cast<float>(from / width)),
+      b(static_cast<float>(to % width), static_cast<float>(to / width));
+  const float near_a = 1 / coarse_.points[from].norm(), near_b = 1 / coarse_.points[to].norm();
+  const int steps = std::max(1, static_cast<int>((b - a).norm()));
   for (int k = 0; k <= steps; ++k) {
     const float t = static_cast<float>(k) / static_cast<float>(steps);
-    const Eigen::Vector2i q = (pa.middle + t * (pb.middle - pa.middle)).cast<int>();
+    const Eigen::Vector2i q = (a + t * (b - a)).array().round().cast<int>();
     const auto at = static_cast<std::size_t>(q.y() * coarse_.width + q.x());
-    const int o = owner(at);
-    if (o == owner_a || o == owner_b) continue;
+    if (patches_.label[at] == patches_.label[from] || patches_.label[at] == patches_.label[to]) continue;
     const auto& p = point_at(q.x(), q.y());
     if (!PointGrid::seen(p)) continue;
     // Along a line in the image the inverse of the depth of a plane is linear.
-    const float expected = 1 / ((1 - t) / pa.centroid.norm() + t / pb.centroid.norm());
-    ++(p.norm() < expected - kInFront ? hidden : open);
+    const float expected = 1 / ((1 - t) * near_a + t * near_b);
+    ++(p.norm() < expected - kInFront ? sight.hidden : sight.open);
   }
-  return hidden > 0 && open * 10 <= hidden;
+}
+
+/// Up to kSpread cells of each patch, evenly by their order in the image.
+void Assembly::spread_cells() {
+  spread_.assign(patches_.list.size(), {});
+  std::vector<std::size_t> seen(patches_.list.size(), 0);
+  for (std::size_t at = 0; at < patches_.label.size(); ++at) {
+    if (patches_.label[at] == 0) continue;
+    const std::size_t k = patches_.label[at] - 1u, n = patches_.list[k].cells, i = seen[k]++;
+    if ((i + 1) * kSpread / n != i * kSpread / n) spread_[k].push_back(static_cast<std::uint32_t>(at));
+  }
 }
 
 /// Pieces of one thing to both sides of what stands before it.
 void Assembly::bridge_occlusions() {
+  spread_cells();
   for (std::size_t a = 0; a < patches_.list.size(); ++a)
     for (std::size_t b = a + 1; b < patches_.list.size(); ++b) {
       if (parent_[a] == parent_[b] || !continues(patches_.list[a], patches_.list[b]) || !hidden_between(a, b)) continue;
@@ -301,11 +369,11 @@ void Assembly::bridge_occlusions() {
 
 Objects group_patches(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const GroupingOptions& options) {
   const auto contacts = measure_contacts(grid, coarse, patches, options);
-  Assembly assembly(grid, coarse, patches, options.up, contract(patches.list.size(), contacts));
-  assembly.absorb_fragments(contacts);
-  assembly.close_hollows();
-  assembly.join_hanging(contacts);
+  Assembly assembly(grid, coarse, patches, options.up, options.noise, contract(patches.list.size(), contacts));
   assembly.bridge_occlusions();
+  assembly.close_hollows();
+  assembly.absorb_fragments(contacts);
+  assembly.join_hanging(contacts);
   Objects objects;
   std::vector<int> number(patches.list.size(), -1);
   for (const int root : assembly.parent()) {

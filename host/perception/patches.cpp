@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -18,8 +19,12 @@ constexpr int kNormalRadius = 3;      // [cells]
 constexpr float kNormalReach = 2.2f;  // neighbours are within this many footprints times the radius: slanted faces are stretched
 constexpr float kFewNeighbours = 6;
 constexpr int kRowsAtOnce = 8;           // of cells, that one thread works on
-constexpr float kSameFace = 0.93f;       // cosine between a cell's normal and its patch's mean: 21.6 degrees
-constexpr std::size_t kSmallPatch = 12;  // [cells]
+constexpr double kSameFace = 0.965;      // cosine between a cell's normal and its patch's mean: 15.2 degrees,
+constexpr double kSameRoughFace = 0.93;  // 21.6 where normals are unsteady
+constexpr double kSmallPatch = 8;        // [cells]
+constexpr double kSmallRoughPatch = 12;
+constexpr float kSteady = 0.04f;    // [rad] that normals of a face differ by, good ones, of a depth camera nearby
+constexpr float kUnsteady = 0.08f;  // and of a noisy one, or of stereo
 
 /// Rows [row, end) of cells.
 void average_blocks(const PointGrid& grid, const Popout& popout, int row, int end, CoarseGrid& coarse) {
@@ -77,11 +82,32 @@ void estimate_normal(CoarseGrid& coarse, int cu, int cv, float pitch) {
   coarse.variation[at] = std::max(0.0f, solver.eigenvalues()[0]) / std::max(1e-12f, scatter.trace());
 }
 
+/// By what the normals of a tenth of the cells, the flattest, differ from those of cells so far off that no point tells both.
+float unsteadiness(const CoarseGrid& coarse) {
+  constexpr std::size_t kApart = 2 * kNormalRadius + 1;
+  constexpr double kShare = 0.1;
+  std::vector<float> differ;  // chords, squared
+  const auto width = static_cast<std::size_t>(coarse.width), height = static_cast<std::size_t>(coarse.height);
+  for (std::size_t v = 0; v + kApart < height; v += 2)
+    for (std::size_t u = 0; u + kApart < width; u += 2) {
+      const std::size_t at = v * width + u;
+      if (coarse.group[at] == 0 || coarse.normals[at].squaredNorm() == 0) continue;
+      for (const std::size_t to : {at + kApart, at + kApart * width})
+        if (coarse.group[to] == coarse.group[at] && coarse.normals[to].squaredNorm() > 0)
+          differ.push_back((coarse.normals[to] - coarse.normals[at]).squaredNorm());
+    }
+  if (differ.size() < 64) return 0;
+  const auto flattest = differ.begin() + static_cast<std::ptrdiff_t>(kShare * static_cast<double>(differ.size()));
+  std::nth_element(differ.begin(), flattest, differ.end());
+  return std::clamp((std::sqrt(*flattest) - kSteady) / (kUnsteady - kSteady), 0.0f, 1.0f);
+}
+
 /// Breadth first from `seed`, over cells whose normal agrees with the patch's.
 void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, float pitch, Patches& patches,
               std::vector<std::uint32_t>& queue) {
   queue.assign(1, static_cast<std::uint32_t>(seed));
   patches.label[seed] = mark;
+  const auto least_cosine = static_cast<float>(by_steadiness(coarse, kSameFace, kSameRoughFace));
   Eigen::Vector3f sum = coarse.normals[seed], mean = sum;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     const std::size_t at = queue[next];
@@ -90,7 +116,7 @@ void grow_one(const CoarseGrid& coarse, std::size_t seed, std::uint16_t mark, fl
     for (int v = std::max(0, cv - 1); v <= std::min(coarse.height - 1, cv + 1); ++v)
       for (int u = std::max(0, cu - 1); u <= std::min(coarse.width - 1, cu + 1); ++u) {
         const auto to = static_cast<std::size_t>(v * coarse.width + u);
-        if (patches.label[to] != 0 || coarse.group[to] != coarse.group[seed] || coarse.normals[to].dot(mean) < kSameFace) continue;
+        if (patches.label[to] != 0 || coarse.group[to] != coarse.group[seed] || coarse.normals[to].dot(mean) < least_cosine) continue;
         if ((coarse.points[to] - coarse.points[at]).squaredNorm() > reach * reach) continue;
         patches.label[to] = mark;
         queue.push_back(static_cast<std::uint32_t>(to));
@@ -193,6 +219,7 @@ CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout, int thr
       for (int u = 0; u < coarse.width; ++u)
         if (coarse.group[static_cast<std::size_t>(v * coarse.width + u)] != 0) estimate_normal(coarse, u, v, grid.pitch);
   });
+  coarse.unsteady = unsteadiness(coarse);
   return coarse;
 }
 
@@ -207,7 +234,7 @@ Patches grow_patches(const CoarseGrid& coarse, float pitch) {
   for (const auto seed : seeds) {
     if (patches.label[seed] != 0 || tried[seed] != 0 || patches.list.size() >= 65000) continue;
     grow_one(coarse, seed, static_cast<std::uint16_t>(patches.list.size() + 1), pitch, patches, queue);
-    if (queue.size() >= kSmallPatch) {
+    if (static_cast<double>(queue.size()) >= by_steadiness(coarse, kSmallPatch, kSmallRoughPatch)) {
       patches.list.emplace_back();
       continue;
     }

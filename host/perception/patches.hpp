@@ -16,6 +16,7 @@ struct CoarseGrid {
   std::vector<Eigen::Vector3f> normals;  ///< unit, towards the camera; zero where there are too few neighbours
   std::vector<float> variation;          ///< least eigenvalue over the sum, of the neighbourhood
   std::vector<std::uint16_t> group;      ///< pop-out group
+  float unsteady = 0;                    ///< how far normals are to be distrusted, 0 to 1: by what those of neighbours on a face differ
   float footprint(std::size_t at, float pitch) const { return static_cast<float>(stride) * pitch * points[at].norm(); }
 };
 
@@ -32,6 +33,11 @@ struct Patches {
 };
 
 CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout, int threads = 0);
+/// `steady` where normals are, `unsteady` where they are not, and what lies between for what lies between.
+inline double by_steadiness(const CoarseGrid& coarse, double steady, double unsteady) {
+  return steady + static_cast<double>(coarse.unsteady) * (unsteady - steady);
+}
+
 Patches grow_patches(const CoarseGrid& coarse, float pitch);
 
 }  // namespace swarmfit::perception

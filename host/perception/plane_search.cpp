@@ -373,7 +373,7 @@ Expected<PlaneSearch> find_supports(Fitter& fitter, const PointGrid& grid, const
   for (std::size_t k = 0; k < surfaces.size(); ++k)
     if (!is_surface(overview, seen, surfaces[k], static_cast<float>(fit.threshold))) fit.models[k].inliers = 0;
   erase_models(fit, surfaces, static_cast<std::size_t>(options.min_plane_share * static_cast<double>(grid.finite)));
-  const auto supporting = choose_supporting(surfaces, options.max_height);
+  const auto supporting = choose_supporting(grid, surfaces, options.max_height);
   for (std::size_t k = 0; k < surfaces.size(); ++k) {
     to_data_frame(fit.models[k], grid.origin, up);
     fit.models[k].supporting = supporting[k];

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -21,6 +22,13 @@ constexpr double kTopArea = 0.07;               // [m^2] the largest top of a th
 constexpr double kTopLength = 0.45;             // [m] and its longest side
 constexpr double kSeatHeight = 0.28;            // [m] from here on it is rather a piece of furniture, and a thing's top is smaller:
 constexpr double kHighTopArea = 0.03;           // [m^2]
+constexpr double kTopsShare = 0.3;              // of the area below that tops beside each other take up at most,
+constexpr double kTopsTilt = 0.07;              // [rad] unless they are the tops of several heights
+constexpr double kWalled = 0.35;                // of the border of a top, below which sides go down
+constexpr float kSidesFrom = 0.15f;             // of the way down: a board's edge ends before, sides go on,
+constexpr float kSidesTo = 0.85f;               // and what is lower may be the foot of something else
+constexpr float kFootTo = 1.5f;                  // what is seen so far down tells that nothing goes down before it
+constexpr int kPointsOfSide = 3;                // in each half of the way, about a cell of the border
 constexpr double kReasonableArea = 0.01;        // [m^2] nothing smaller carries anything
 constexpr std::size_t kPointsForNoise = 16384;  // of a frame are looked at
 constexpr float kNoiseAtOneMetre = 0.0015f;     // [m] where there are too few inliers to measure it
@@ -226,6 +234,49 @@ std::optional<double> rise_above(const Surface& small, const Surface& large) {
   return rise / static_cast<double>(cells);
 }
 
+/// Share of the border of `top` below which something goes all the way down to `base`, `rise` further down: the sides of things. Of the
+/// border below which anything is seen.
+double walled_share(const PointGrid& grid, const Surface& top, double rise) {
+  const auto cells = top.component.size();
+  std::vector<int> upper(cells, 0), lower(cells, 0), foot(cells, 0);
+  const auto way = static_cast<float>(rise);
+  for (const auto& p : grid.points) {
+    const float down = -top.plane.height(p) / way;
+    if (!(down > kSidesFrom && down < kFootTo)) continue;  // nor where nothing was seen
+    const int at = top.cell_of(p);
+    if (at >= 0) ++(down < 0.5f ? upper : down < kSidesTo ? lower : foot)[static_cast<std::size_t>(at)];
+  }
+  std::size_t walled = 0, seen = 0;
+  for (int b = 1; b + 1 < top.rows; ++b)
+    for (int a = 1; a + 1 < top.columns; ++a) {
+      const auto at = static_cast<std::size_t>(b * top.columns + a), row = static_cast<std::size_t>(top.columns);
+      if (top.component[at] == 0) continue;
+      int around = 0, high = 0, low = 0, floor = 0;
+      for (const std::size_t line : {at - row, at, at + row})
+        for (const std::size_t to : {line - 1, line, line + 1}) {
+          around += top.component[to];
+          high += upper[to];
+          low += lower[to];
+          floor += foot[to];
+        }
+      if (around == 9 || high + low + floor < kPointsOfSide) continue;
+      ++seen;
+      walled += high >= kPointsOfSide && low >= kPointsOfSide ? 1 : 0;
+    }
+  return seen == 0 ? 0 : static_cast<double>(walled) / static_cast<double>(seen);
+}
+
+/// The top of a thing, or those of several beside each other, that stand on `base`.
+bool is_top(const PointGrid& grid, const Surface& top, const Surface& base, double max_height) {
+  const auto rise = rise_above(top, base);
+  if (!rise || *rise >= max_height) return false;
+  if (*rise >= kSeatHeight && top.piece_area >= kHighTopArea) return false;
+  if (top.piece_area < kTopArea && top.piece_length < kTopLength) return true;
+  if (*rise >= kSeatHeight) return false;
+  const double tilt = std::acos(std::min(1.0, static_cast<double>(top.plane.normal.dot(base.plane.normal))));
+  return (top.area <= kTopsShare * base.area || tilt > kTopsTilt) && walled_share(grid, top, *rise) > kWalled;
+}
+
 }  // namespace
 
 Surface lay_axes(const LocalPlane& plane, int model) {
@@ -295,7 +346,7 @@ double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> label
   return 1.4826 * static_cast<double>(*middle);
 }
 
-std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double max_height) {
+std::vector<bool> choose_supporting(const PointGrid& grid, std::span<const Surface> surfaces, double max_height) {
   std::vector<bool> supporting(surfaces.size(), false);
   std::vector<std::size_t> by_area(surfaces.size());
   std::iota(by_area.begin(), by_area.end(), std::size_t{0});
@@ -303,11 +354,9 @@ std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double ma
   for (const auto i : by_area) {
     if (surfaces[i].area < kReasonableArea) continue;
     supporting[i] = true;
-    if (surfaces[i].piece_area >= kTopArea || surfaces[i].piece_length >= kTopLength) continue;
-    for (std::size_t j = 0; j < surfaces.size(); ++j) {
+    for (std::size_t j = 0; j < surfaces.size() && supporting[i]; ++j) {
       if (j == i || !supporting[j] || surfaces[j].area <= 2 * surfaces[i].area) continue;
-      const auto rise = rise_above(surfaces[i], surfaces[j]);
-      if (rise && *rise < max_height && (*rise < kSeatHeight || surfaces[i].piece_area < kHighTopArea)) supporting[i] = false;
+      supporting[i] = !is_top(grid, surfaces[i], surfaces[j], max_height);
     }
   }
   return supporting;

@@ -65,7 +65,8 @@ Surface make_surface(const PointGrid& grid, std::span<const std::uint16_t> label
 /// Standard deviation of the heights of the surface's points at a range of one metre, robustly.
 double measure_noise(const PointGrid& grid, std::span<const std::uint16_t> labels, const Surface& surface);
 
-/// Which surfaces support: of reasonable size, and not the top of a thing that stands on a larger one.
-std::vector<bool> choose_supporting(std::span<const Surface> surfaces, double max_height);
+/// Which surfaces support: of reasonable size, and not the tops of things that stand on a larger one. `grid` is the frame in which they lie:
+/// below the borders of tops it has the things' sides.
+std::vector<bool> choose_supporting(const PointGrid& grid, std::span<const Surface> surfaces, double max_height);
 
 }  // namespace swarmfit::perception
