@@ -28,7 +28,7 @@ constexpr float kBridge = 0.35f;          // [m] between the middles of two piec
 constexpr std::size_t kBridgeCells = 25;  // smaller patches do not tell their surface
 constexpr std::size_t kSpread = 5;        // cells of a patch from which lines run to those of another
 constexpr int kOpenOfHidden = 8;          // so many cells must be hidden for each that is not
-constexpr double kHangingShare = 0.5;    // of what a piece hangs on, in cells: a handle is smaller
+constexpr double kHangingShare = 0.5;     // of what a piece hangs on, in cells: a handle is smaller
 constexpr float kInFront = 0.005f;        // [m]
 constexpr float kClear = 0.025f;          // [m] what is seen this far behind a piece's lower border does not carry it
 constexpr double kMostlyClear = 0.5;      // of the lower border of a piece that hangs
@@ -50,6 +50,9 @@ struct Border {
   double rim = 0;   ///< where the other is as high as the one's top and no farther off: a rim that is seen from outside
 };
 
+/// By a piece and what it borders on; -1 is what is no piece.
+using Borders = std::map<std::pair<int, int>, Border>;
+
 /// What is seen along lines between two patches of one plane, in cells.
 struct Sight {
   int hidden = 0;  ///< something before that plane
@@ -69,6 +72,7 @@ class Assembly {
   Assembly(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const Eigen::Vector3f& up, double noise,
            std::vector<int> parent)
       : grid_(grid), coarse_(coarse), patches_(patches), up_(up), noise_(static_cast<float>(noise)), parent_(std::move(parent)) {
+    sort_cells();
     down_ = downwards();
   }
 
@@ -91,14 +95,16 @@ class Assembly {
       if (p == gone) p = keep;
   }
   std::map<int, std::size_t> count_cells() const;
-  std::map<int, Piece> describe() const;
-  std::map<std::pair<int, int>, Border> measure_borders(const std::map<int, Piece>& pieces) const;
+  void sort_cells();
+  std::vector<std::uint32_t> cells_of(int root) const;
+  Piece describe(int root) const;
+  static void move_borders(int keep, int gone, Borders& borders);
+  void measure_borders(int root, const Piece& piece, Borders& borders) const;
   Eigen::Vector2i downwards() const;
   std::map<int, Footing> find_footing() const;
   bool continues(const Patch& a, const Patch& b) const;
   bool hidden_between(std::size_t patch_a, std::size_t patch_b) const;
   void look_between(std::uint32_t from, std::uint32_t to, Sight& sight) const;
-  void spread_cells();
 
   const PointGrid& grid_;
   const CoarseGrid& coarse_;
@@ -106,8 +112,8 @@ class Assembly {
   Eigen::Vector3f up_;
   float noise_;  // of a depth at one metre
   Eigen::Vector2i down_;
-  std::vector<std::vector<std::uint32_t>> spread_;  // cells of each patch
-  std::vector<int> parent_;                         // one a patch: the piece it belongs to
+  std::vector<std::vector<std::uint32_t>> cells_;  // of each patch, in the order of the image
+  std::vector<int> parent_;                        // one a patch: the piece it belongs to
 };
 
 std::map<int, std::size_t> Assembly::count_cells() const {
@@ -116,38 +122,43 @@ std::map<int, std::size_t> Assembly::count_cells() const {
   return cells;
 }
 
-std::map<int, Piece> Assembly::describe() const {
-  std::map<int, Piece> pieces;
+void Assembly::sort_cells() {
+  cells_.assign(patches_.list.size(), {});
+  for (std::size_t at = 0; at < patches_.label.size(); ++at)
+    if (patches_.label[at] != 0) cells_[patches_.label[at] - 1u].push_back(static_cast<std::uint32_t>(at));
+}
+
+std::vector<std::uint32_t> Assembly::cells_of(int root) const {
+  std::vector<std::uint32_t> all;
+  for (std::size_t i = 0; i < parent_.size(); ++i)
+    if (parent_[i] == root) all.insert(all.end(), cells_[i].begin(), cells_[i].end());
+  return all;
+}
+
+Piece Assembly::describe(int root) const {
+  Piece piece;
   for (std::size_t i = 0; i < parent_.size(); ++i) {
-    auto& piece = pieces[parent_[i]];
+    if (parent_[i] != root) continue;
     piece.cells += patches_.list[i].cells;
     piece.centroid += static_cast<float>(patches_.list[i].cells) * patches_.list[i].centroid;
   }
-  for (auto& [number, piece] : pieces) piece.centroid /= static_cast<float>(std::max<std::size_t>(1, piece.cells));
-  struct Sums {
-    double along = 0, length = 0;
-    std::vector<float> heights;
-  };
-  std::vector<Sums> sums(parent_.size());
-  for (std::size_t at = 0; at < patches_.label.size(); ++at) {
-    const int o = owner(at);
-    if (o < 0) continue;
-    auto& sum = sums[static_cast<std::size_t>(o)];
-    sum.heights.push_back(up_.dot(coarse_.points[at]));
-    const Eigen::Vector3f d = coarse_.points[at] - pieces.at(o).centroid;
+  piece.centroid /= static_cast<float>(std::max<std::size_t>(1, piece.cells));
+  double along = 0, length = 0;
+  std::vector<float> heights;
+  heights.reserve(piece.cells);
+  for (const auto at : cells_of(root)) {
+    heights.push_back(up_.dot(coarse_.points[at]));
+    const Eigen::Vector3f d = coarse_.points[at] - piece.centroid;
     const Eigen::Vector3f n = coarse_.normals[at] - up_ * up_.dot(coarse_.normals[at]), flat = d - up_ * up_.dot(d);
-    sum.along += static_cast<double>(n.dot(flat));
-    sum.length += static_cast<double>(n.norm() * flat.norm());
+    along += static_cast<double>(n.dot(flat));
+    length += static_cast<double>(n.norm() * flat.norm());
   }
-  for (auto& [number, piece] : pieces) {
-    auto& sum = sums[static_cast<std::size_t>(number)];
-    if (sum.heights.empty()) continue;
-    piece.divergence = sum.length > 0 ? sum.along / sum.length : 0;
-    const auto high = sum.heights.begin() + static_cast<std::ptrdiff_t>(sum.heights.size() * 95 / 100);
-    std::nth_element(sum.heights.begin(), high, sum.heights.end());
-    piece.top = *high;
-  }
-  return pieces;
+  if (heights.empty()) return piece;
+  piece.divergence = length > 0 ? along / length : 0;
+  const auto high = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() * 95 / 100);
+  std::nth_element(heights.begin(), high, heights.end());
+  piece.top = *high;
+  return piece;
 }
 
 /// Pieces too small to be told apart join the neighbour they touch most, the smallest first.
@@ -176,12 +187,11 @@ void Assembly::absorb_fragments(const Contacts& contacts) {
   }
 }
 
-/// Borders in the image between pieces, both ways; -1 is what is no piece. Of hollows also those to the near rim, that their floor, which
-/// may be as low as the table, parts from the wall that is seen.
-std::map<std::pair<int, int>, Border> Assembly::measure_borders(const std::map<int, Piece>& pieces) const {
+/// A piece's borders in the image. Of a hollow also those to the near rim, which its floor, that may be as low as the table, parts from
+/// the wall that is seen.
+void Assembly::measure_borders(int root, const Piece& piece, Borders& borders) const {
   const std::array<Eigen::Vector2i, 4> around{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}};
-  std::map<std::pair<int, int>, Border> borders;
-  const auto measure = [&](int u, int v, int o, const Piece& piece, const Eigen::Vector2i& step) {
+  const auto measure = [&](int u, int v, const Eigen::Vector2i& step) {
     const auto& p = coarse_.points[static_cast<std::size_t>(v * coarse_.width + u)];
     const float slack = kSlackSigmas * noise_ * p.squaredNorm();
     const int farthest = step == down_ && piece.divergence < kHollow ? kVessel : kRimReach;
@@ -191,39 +201,37 @@ std::map<std::pair<int, int>, Border> Assembly::measure_borders(const std::map<i
       const auto to = static_cast<std::size_t>(y * coarse_.width + x);
       const int other = owner(to);
       if (other < 0) continue;
-      if (other == o) return;
+      if (other == root) return;
       const auto& q = coarse_.points[to];
       const float apart = (p - q).norm();
       const bool as_high = std::abs(up_.dot(q) - piece.top) < kRim + slack, farther = q.norm() >= p.norm() + kBelowRim + slack;
-      Border& border = borders[{o, other}];
+      Border& border = borders[{root, other}];
       border.near += apart < kRimWidth + slack ? 1 : 0;
       border.rim += as_high && !farther && apart < kVesselWidth ? 1 : 0;
       if (reach > kRimReach) break;
       border.all += 1;
       return;
     }
-    borders[{o, -1}].all += 1;
+    borders[{root, -1}].all += 1;
   };
-  for (int v = 0; v < coarse_.height; ++v)
-    for (int u = 0; u < coarse_.width; ++u) {
-      const int o = owner(static_cast<std::size_t>(v * coarse_.width + u));
-      if (o < 0) continue;
-      const Piece& piece = pieces.at(o);
-      for (const auto& step : around) measure(u, v, o, piece, step);
-    }
-  return borders;
+  for (const auto at : cells_of(root)) {
+    const int u = static_cast<int>(at) % coarse_.width, v = static_cast<int>(at) / coarse_.width;
+    for (const auto& step : around) measure(u, v, step);
+  }
 }
 
 /// The inside of a pot or cup goes with its outside: the parts of a hollow lie side by side, and its shell is seen at its rim, before what is
 /// inside. What stands behind a rim, or before it but higher or lower, is something else. A basin lies within what encloses it.
 void Assembly::close_hollows() {
+  std::map<int, Piece> pieces;
+  Borders borders;
+  for (const int root : parent_)
+    if (pieces.count(root) == 0) measure_borders(root, pieces[root] = describe(root), borders);
   std::set<int> closed;  // hollows that have found their shells, which may look hollow still
+  const auto is_hollow = [&](int piece) { return closed.count(piece) == 0 && pieces.at(piece).divergence < kHollow; };
   while (true) {
-    const auto pieces = describe();
-    const auto borders = measure_borders(pieces);
     std::map<int, double> around;
     for (const auto& [pair, border] : borders) around[pair.first] += border.all;
-    const auto is_hollow = [&](int piece) { return closed.count(piece) == 0 && pieces.at(piece).divergence < kHollow; };
     std::pair<int, int> best{-1, -1};
     double most = kRimCells;
     for (const auto& [pair, border] : borders) {
@@ -236,9 +244,32 @@ void Assembly::close_hollows() {
       most = length;
       best = pair;
     }
-    if (best.first < 0) return;
-    if (!is_hollow(best.second) && pieces.at(best.second).divergence > -kHollow) closed.insert(best.second);
-    join(best.second, best.first);
+    const auto [gone, keep] = best;
+    if (gone < 0) return;
+    if (!is_hollow(keep) && pieces.at(keep).divergence > -kHollow) closed.insert(keep);
+    join(keep, gone);
+    pieces.erase(gone);
+    move_borders(keep, gone, borders);
+    measure_borders(keep, pieces[keep] = describe(keep), borders);
+  }
+}
+
+/// What others share with the one that is gone they share with the one that stays; what the two themselves have is to be measured anew.
+void Assembly::move_borders(int keep, int gone, Borders& borders) {
+  for (auto it = borders.begin(); it != borders.end();) {
+    const auto [from, to] = it->first;
+    const bool of_others = from != keep && from != gone;
+    if (of_others && to != gone) {
+      ++it;
+      continue;
+    }
+    if (of_others) {
+      Border& all = borders[{from, keep}];
+      all.all += it->second.all;
+      all.near += it->second.near;
+      all.rim += it->second.rim;
+    }
+    it = borders.erase(it);
   }
 }
 
@@ -319,9 +350,10 @@ bool Assembly::continues(const Patch& a, const Patch& b) const {
 /// Whether what is seen between two patches lies in front of the surface that would join them: from cells spread over the one to cells
 /// spread over the other, as a face is convex.
 bool Assembly::hidden_between(std::size_t patch_a, std::size_t patch_b) const {
+  const auto pick = [&](std::size_t patch, std::size_t k) { return cells_[patch][(2 * k + 1) * cells_[patch].size() / (2 * kSpread)]; };
   Sight sight;
-  for (const auto from : spread_[patch_a])
-    for (const auto to : spread_[patch_b]) look_between(from, to, sight);
+  for (std::size_t a = 0; a < kSpread; ++a)
+    for (std::size_t b = 0; b < kSpread; ++b) look_between(pick(patch_a, a), pick(patch_b, b), sight);
   return sight.hidden > 0 && sight.open * kOpenOfHidden <= sight.hidden;
 }
 
@@ -344,20 +376,8 @@ void Assembly::look_between(std::uint32_t from, std::uint32_t to, Sight& sight) 
   }
 }
 
-/// Up to kSpread cells of each patch, evenly by their order in the image.
-void Assembly::spread_cells() {
-  spread_.assign(patches_.list.size(), {});
-  std::vector<std::size_t> seen(patches_.list.size(), 0);
-  for (std::size_t at = 0; at < patches_.label.size(); ++at) {
-    if (patches_.label[at] == 0) continue;
-    const std::size_t k = patches_.label[at] - 1u, n = patches_.list[k].cells, i = seen[k]++;
-    if ((i + 1) * kSpread / n != i * kSpread / n) spread_[k].push_back(static_cast<std::uint32_t>(at));
-  }
-}
-
 /// Pieces of one thing to both sides of what stands before it.
 void Assembly::bridge_occlusions() {
-  spread_cells();
   for (std::size_t a = 0; a < patches_.list.size(); ++a)
     for (std::size_t b = a + 1; b < patches_.list.size(); ++b) {
       if (parent_[a] == parent_[b] || !continues(patches_.list[a], patches_.list[b]) || !hidden_between(a, b)) continue;

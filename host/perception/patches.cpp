@@ -4,10 +4,12 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "host/common/parallel.hpp"
 
@@ -52,34 +54,112 @@ void average_blocks(const PointGrid& grid, const Popout& popout, int row, int en
     }
 }
 
-void estimate_normal(CoarseGrid& coarse, int cu, int cv, float pitch) {
-  const auto at = static_cast<std::size_t>(cv * coarse.width + cu);
-  const auto& p = coarse.points[at];
-  const float reach = kNormalReach * kNormalRadius * coarse.footprint(at, pitch);
-  // Sums of the differences and of their products, component by component.
-  float count = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
-  const int first = std::max(0, cu - kNormalRadius), last = std::min(coarse.width - 1, cu + kNormalRadius);
-  for (int v = std::max(0, cv - kNormalRadius); v <= std::min(coarse.height - 1, cv + kNormalRadius); ++v)
-    for (int u = first; u <= last; ++u) {
-      const auto to = static_cast<std::size_t>(v * coarse.width + u);
-      const Eigen::Vector3f d = coarse.points[to] - p;
-      if (coarse.group[to] != coarse.group[at] || d.squaredNorm() > reach * reach) continue;
-      ++count;
-      x += d.x(), y += d.y(), z += d.z();
-      xx += d.x() * d.x(), xy += d.x() * d.y(), xz += d.x() * d.z();
-      yy += d.y() * d.y(), yz += d.y() * d.z(), zz += d.z() * d.z();
+/// Coordinates and groups column by column, with a frame of empty cells around, so that a whole row of neighbourhoods is summed at once.
+struct CoarseColumns {
+  static constexpr int kLanes = 8;  // cells side by side
+  int width = 0;                    // of a row with its frame
+  std::vector<float> x, y, z, group;
+
+  explicit CoarseColumns(const CoarseGrid& coarse) {
+    width = (coarse.width + kLanes - 1) / kLanes * kLanes + 2 * kNormalRadius;
+    const auto cells = static_cast<std::size_t>(width) * static_cast<std::size_t>(coarse.height + 2 * kNormalRadius);
+    for (auto* column : {&x, &y, &z, &group}) column->assign(cells, 0.0f);
+    for (int v = 0; v < coarse.height; ++v)
+      for (int u = 0; u < coarse.width; ++u) {
+        const auto from = static_cast<std::size_t>(v * coarse.width + u), to = static_cast<std::size_t>(at(u, v));
+        if (coarse.group[from] == 0) continue;
+        x[to] = coarse.points[from].x();
+        y[to] = coarse.points[from].y();
+        z[to] = coarse.points[from].z();
+        group[to] = static_cast<float>(coarse.group[from]);
+      }
+  }
+  int at(int u, int v) const { return (v + kNormalRadius) * width + u + kNormalRadius; }
+};
+
+/// Sums over neighbourhoods: of the differences to the middle, and of their products, component by component.
+struct NeighbourSums {
+  static constexpr int kCount = 10;
+  float of[kCount][CoarseColumns::kLanes] = {};
+
+  /// Of kLanes cells from (u, v) on.
+  void add(const CoarseColumns& from, int u, int v, float reach_per_range) {
+    constexpr int kLanes = CoarseColumns::kLanes;
+    const auto middle = static_cast<std::size_t>(from.at(u, v));
+    float reach[kLanes];
+    for (int k = 0; k < kLanes; ++k) {
+      const std::size_t i = middle + static_cast<std::size_t>(k);
+      reach[k] = reach_per_range * reach_per_range * (from.x[i] * from.x[i] + from.y[i] * from.y[i] + from.z[i] * from.z[i]);
     }
-  if (count < kFewNeighbours) return;
-  const Eigen::Vector3f sum(x, y, z);
-  Eigen::Matrix3f scatter;
-  scatter << xx, xy, xz, xy, yy, yz, xz, yz, zz;
-  scatter -= sum * sum.transpose() / count;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  solver.computeDirect(scatter);
-  Eigen::Vector3f n = solver.eigenvectors().col(0);
-  if (n.dot(p) > 0) n = -n;
-  coarse.normals[at] = n;
-  coarse.variation[at] = std::max(0.0f, solver.eigenvalues()[0]) / std::max(1e-12f, scatter.trace());
+    for (int dv = -kNormalRadius; dv <= kNormalRadius; ++dv)
+      for (int du = -kNormalRadius; du <= kNormalRadius; ++du) {
+        const float *x = &from.x[middle], *y = &from.y[middle], *z = &from.z[middle], *group = &from.group[middle];
+        const int to = dv * from.width + du;
+        for (int k = 0; k < kLanes; ++k) {
+          const float dx = x[to + k] - x[k], dy = y[to + k] - y[k], dz = z[to + k] - z[k];
+          const float near = dx * dx + dy * dy + dz * dz <= reach[k] ? 1.0f : 0.0f, same = group[to + k] == group[k] ? near : 0.0f;
+          const float mx = same * dx, my = same * dy, mz = same * dz;
+          of[0][k] += same;
+          of[1][k] += mx, of[2][k] += my, of[3][k] += mz;
+          of[4][k] += mx * dx, of[5][k] += mx * dy, of[6][k] += mx * dz;
+          of[7][k] += my * dy, of[8][k] += my * dz, of[9][k] += mz * dz;
+        }
+      }
+  }
+};
+
+/// Of a symmetric matrix without negative eigenvalues: the least eigenvalue, by Newton's method from below, and its eigenvector.
+float least_eigenvalue(const Eigen::Matrix3f& m, Eigen::Vector3f& vector) {
+  constexpr int kMostSteps = 16;
+  constexpr float kClose = 1e-6f;  // of the trace
+  const float trace = m.trace(), det = m.determinant();
+  const float minors =
+      m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1) + m(0, 0) * m(2, 2) - m(0, 2) * m(0, 2) + m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2);
+  float least = 0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const float value = ((trace - least) * least - minors) * least + det, slope = (2 * trace - 3 * least) * least - minors;
+    if (!(slope < 0)) break;
+    const float change = -value / slope;
+    least += change;
+    if (!(change > kClose * trace)) break;
+  }
+  least = std::max(0.0f, least);
+  // The longest of what is across two rows.
+  Eigen::Matrix3f shifted = m;
+  shifted.diagonal().array() -= least;
+  const Eigen::Vector3f across[3] = {shifted.col(0).cross(shifted.col(1)), shifted.col(0).cross(shifted.col(2)),
+                                     shifted.col(1).cross(shifted.col(2))};
+  const auto* longest = std::max_element(std::begin(across), std::end(across), [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+    return a.squaredNorm() < b.squaredNorm();
+  });
+  vector = *longest / std::max(1e-30f, longest->norm());
+  return least;
+}
+
+void estimate_normals(const CoarseColumns& columns, int row, float pitch, CoarseGrid& coarse) {
+  constexpr int kLanes = CoarseColumns::kLanes;
+  const float reach = kNormalReach * kNormalRadius * static_cast<float>(coarse.stride) * pitch;  // for each metre of range
+  for (int first = 0; first < coarse.width; first += kLanes) {
+    const int last = std::min(coarse.width, first + kLanes);
+    const auto start = static_cast<std::size_t>(row * coarse.width + first);
+    if (std::all_of(&coarse.group[start], &coarse.group[start] + (last - first), [](std::uint16_t g) { return g == 0; })) continue;
+    NeighbourSums sums;
+    sums.add(columns, first, row, reach);
+    for (int u = first; u < last; ++u) {
+      const auto at = static_cast<std::size_t>(row * coarse.width + u);
+      const auto of = [&](int sum) { return sums.of[sum][u - first]; };
+      const float count = of(0);
+      if (coarse.group[at] == 0 || count < kFewNeighbours) continue;
+      const Eigen::Vector3f sum(of(1), of(2), of(3));
+      Eigen::Matrix3f scatter;
+      scatter << of(4), of(5), of(6), of(5), of(7), of(8), of(6), of(8), of(9);
+      scatter -= sum * sum.transpose() / count;
+      Eigen::Vector3f n;
+      const float least = least_eigenvalue(scatter, n);
+      coarse.normals[at] = n.dot(coarse.points[at]) > 0 ? -n : n;
+      coarse.variation[at] = least / std::max(1e-12f, scatter.trace());
+    }
+  }
 }
 
 /// By what the normals of a tenth of the cells, the flattest, differ from those of cells so far off that no point tells both.
@@ -214,10 +294,9 @@ CoarseGrid make_coarse_grid(const PointGrid& grid, const Popout& popout, int thr
   coarse.variation.assign(cells, 1);
   coarse.group.assign(cells, 0);
   common::in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) { average_blocks(grid, popout, first, last, coarse); });
+  const CoarseColumns columns(coarse);
   common::in_parallel(coarse.height, kRowsAtOnce, threads, [&](int first, int last) {
-    for (int v = first; v < last; ++v)
-      for (int u = 0; u < coarse.width; ++u)
-        if (coarse.group[static_cast<std::size_t>(v * coarse.width + u)] != 0) estimate_normal(coarse, u, v, grid.pitch);
+    for (int v = first; v < last; ++v) estimate_normals(columns, v, grid.pitch, coarse);
   });
   coarse.unsteady = unsteadiness(coarse);
   return coarse;
