@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host/perception/objects.hpp"
+#include "host/perception/patches.hpp"
 #include "host/perception/runs.hpp"
 #include "tests/perception_fixture.hpp"
 
@@ -138,6 +139,39 @@ TEST(Objects, TheFloorOfAVesselJoinsIt) {
   }
   ASSERT_GT(inside, 1000u);
   EXPECT_GT(static_cast<double>(joined), 0.95 * static_cast<double>(inside));
+}
+
+/// Of one box before the camera, with depths that are off by this at one metre [m].
+CoarseGrid coarse_box(double noise) {
+  const auto rendering = test::render_table({{{0, 0, 0.1}, {0.15, 0.1, 0.1}, 0.4}}, noise, 640, 480);
+  const auto grid = make_grid(rendering.cloud);
+  Popout popout;
+  popout.group.assign(grid.size(), 0);
+  for (std::size_t i = 0; i < grid.size(); ++i) popout.group[i] = rendering.truth[i] == 2 ? 1 : 0;
+  return make_coarse_grid(grid, popout);
+}
+
+TEST(Patches, NormalsAreThoseOfFaces) {
+  const auto coarse = coarse_box(0.0003);
+  // In the fixture's camera: right, down and forward of a camera that looks 42 degrees down.
+  const Eigen::Vector3f up(0, -std::cos(0.733f), -std::sin(0.733f)), right(1, 0, 0), back = up.cross(right);
+  const Eigen::Vector3f side = std::cos(0.4f) * right + std::sin(0.4f) * back, front = std::sin(0.4f) * right - std::cos(0.4f) * back;
+  std::size_t told = 0, along = 0;
+  for (std::size_t at = 0; at < coarse.group.size(); ++at) {
+    const Eigen::Vector3f& n = coarse.normals[at];
+    if (coarse.group[at] == 0 || n.squaredNorm() == 0) continue;
+    ASSERT_NEAR(n.norm(), 1, 1e-3);
+    ASSERT_LE(n.dot(coarse.points[at]), 0);  // towards the camera
+    ++told;
+    along += std::max({std::abs(n.dot(up)), std::abs(n.dot(side)), std::abs(n.dot(front))}) > 0.995f ? 1 : 0;
+  }
+  ASSERT_GT(told, 2000u);
+  EXPECT_GT(static_cast<double>(along), 0.8 * static_cast<double>(told));  // the others lie across an edge
+}
+
+TEST(Patches, NoiseMakesNormalsUnsteady) {
+  EXPECT_EQ(coarse_box(0.0005).unsteady, 0.0F);
+  EXPECT_EQ(coarse_box(0.01).unsteady, 1.0F);
 }
 
 TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {
