@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host/perception/contacts.hpp"
 #include "host/perception/objects.hpp"
 #include "host/perception/patches.hpp"
 #include "host/perception/runs.hpp"
@@ -172,6 +173,18 @@ TEST(Patches, NormalsAreThoseOfFaces) {
 TEST(Patches, NoiseMakesNormalsUnsteady) {
   EXPECT_EQ(coarse_box(0.0005).unsteady, 0.0F);
   EXPECT_EQ(coarse_box(0.01).unsteady, 1.0F);
+}
+
+TEST(Contacts, WhatMerelyTouchesStaysApartWhereNormalsAreSteady) {
+  CoarseGrid coarse;
+  Patches patches;
+  patches.list.resize(3);
+  for (Patch& patch : patches.list) patch.cells = 400;
+  // The first two touch in three cells; the last two share an edge.
+  const Contacts contacts{{{0, 1}, {3, 3}}, {{1, 2}, {20, 20}}};
+  EXPECT_EQ(contract(coarse, patches, contacts), (std::vector<int>{0, 1, 1}));
+  coarse.unsteady = 1;
+  EXPECT_EQ(contract(coarse, patches, contacts), (std::vector<int>{0, 0, 0}));
 }
 
 TEST(Objects, SpacesAreOrderedAndHoldTheirPoints) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <numeric>
 
 namespace swarmfit::perception {
 namespace {
@@ -17,8 +18,9 @@ constexpr float kUnbroken = 4;              // footprints between neighbouring c
 constexpr double kRim = 30;                 // [rad / m] convex, and bent more than this
 constexpr double kStepWeight = 1;
 constexpr double kStepSigmas = 4;
-constexpr int kReach = 6;        // [cells] holes between patches may be this wide
-constexpr float kNear = 0.035f;  // [m] patches this near are neighbours, though they say nothing of each other
+constexpr double kLeastContact = 0.25;  // of the root of the smaller one's cells, where normals are steady
+constexpr int kReach = 6;               // [cells] holes between patches may be this wide
+constexpr float kNear = 0.035f;         // [m] patches this near are neighbours, though they say nothing of each other
 
 /// The place at most `most` cells inside the patch at (u, v), in the direction (du, dv).
 std::size_t step_inside(const CoarseGrid& coarse, const Patches& patches, int u, int v, int du, int dv, int most) {
@@ -137,16 +139,24 @@ Contacts measure_contacts(const PointGrid& grid, const CoarseGrid& coarse, const
   return contacts;
 }
 
-std::vector<int> contract(std::size_t patches, Contacts contacts) {
-  std::vector<int> parent(patches);
-  for (std::size_t i = 0; i < patches; ++i) parent[i] = static_cast<int>(i);
+std::vector<int> contract(const CoarseGrid& coarse, const Patches& patches, Contacts contacts) {
+  const double least = by_steadiness(coarse, kLeastContact, 0);
+  std::vector<int> parent(patches.list.size());
+  std::iota(parent.begin(), parent.end(), 0);
+  std::vector<double> cells;  // of each cluster, at its lowest patch
+  for (const Patch& patch : patches.list) cells.push_back(static_cast<double>(patch.cells));
+  const auto belong_together = [&](const std::pair<int, int>& pair, const Contact& contact) {
+    return contact.weight >
+           least * std::sqrt(std::min(cells[static_cast<std::size_t>(pair.first)], cells[static_cast<std::size_t>(pair.second)]));
+  };
   while (true) {
     auto best = contacts.end();
     for (auto it = contacts.begin(); it != contacts.end(); ++it)
-      if (it->second.weight > 0 && (best == contacts.end() || it->second.weight > best->second.weight)) best = it;
+      if (belong_together(it->first, it->second) && (best == contacts.end() || it->second.weight > best->second.weight)) best = it;
     if (best == contacts.end()) return parent;
     const auto [keep, gone] = best->first;
     contacts.erase(best);
+    cells[static_cast<std::size_t>(keep)] += cells[static_cast<std::size_t>(gone)];
     for (auto& p : parent)
       if (p == gone) p = keep;
     // The contacts of the one that is gone become those of the one that stays.

@@ -30,7 +30,8 @@ using Contacts = std::map<std::pair<int, int>, Contact>;
 Contacts measure_contacts(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const GroupingOptions& options);
 
 /// One a patch: the lowest patch of its cluster. Joins the pair that most belongs together, adds up its contacts with the
-/// others, and so on while any pair does (greedy additive edge contraction, Keuper et al. 2015).
-std::vector<int> contract(std::size_t patches, Contacts contacts);
+/// others, and so on while any pair does (greedy additive edge contraction, Keuper et al. 2015). Two clusters whose contact is short beside
+/// the smaller one merely touch.
+std::vector<int> contract(const CoarseGrid& coarse, const Patches& patches, Contacts contacts);
 
 }  // namespace swarmfit::perception

@@ -389,7 +389,7 @@ void Assembly::bridge_occlusions() {
 
 Objects group_patches(const PointGrid& grid, const CoarseGrid& coarse, const Patches& patches, const GroupingOptions& options) {
   const auto contacts = measure_contacts(grid, coarse, patches, options);
-  Assembly assembly(grid, coarse, patches, options.up, options.noise, contract(patches.list.size(), contacts));
+  Assembly assembly(grid, coarse, patches, options.up, options.noise, contract(coarse, patches, contacts));
   assembly.bridge_occlusions();
   assembly.close_hollows();
   assembly.absorb_fragments(contacts);
