@@ -41,13 +41,14 @@ TEST(GpuNodes, WhatCannotBeReadMayHoldOne) {
 
 TEST(GpuNodes, AutoLoadsNoDriverWhereThereIsNone) {
   if (may_have_gpu()) GTEST_SKIP() << "this machine may have a GPU";
+  const auto loader_is_there = [] { return tests::contents("/proc/self/maps").find("libvulkan") != std::string::npos; };
+  if (loader_is_there()) GTEST_SKIP() << "sanitized tests keep all libraries loaded";
   const auto made = make_evaluator("auto", {});
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(made->evaluator->identity().backend, "cpu");
   EXPECT_EQ(made->reason, "auto: no GPU in /dev");
-  const std::string loaded = tests::contents("/proc/self/maps");
-  ASSERT_FALSE(loaded.empty());
-  EXPECT_EQ(loaded.find("libvulkan"), std::string::npos);
+  EXPECT_FALSE(loader_is_there());
+  ASSERT_FALSE(tests::contents("/proc/self/maps").empty());
 }
 
 }  // namespace
