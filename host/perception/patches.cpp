@@ -4,12 +4,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numeric>
 
-#include <Eigen/Geometry>
-#include <Eigen/LU>
+#include <Eigen/Eigenvalues>
 
 #include "host/common/parallel.hpp"
 
@@ -108,34 +106,6 @@ struct NeighbourSums {
   }
 };
 
-/// Of a symmetric matrix without negative eigenvalues: the least eigenvalue, by Newton's method from below, and its eigenvector.
-float least_eigenvalue(const Eigen::Matrix3f& m, Eigen::Vector3f& vector) {
-  constexpr int kMostSteps = 16;
-  constexpr float kClose = 1e-6f;  // of the trace
-  const float trace = m.trace(), det = m.determinant();
-  const float minors =
-      m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1) + m(0, 0) * m(2, 2) - m(0, 2) * m(0, 2) + m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2);
-  float least = 0;
-  for (int step = 0; step < kMostSteps; ++step) {
-    const float value = ((trace - least) * least - minors) * least + det, slope = (2 * trace - 3 * least) * least - minors;
-    if (!(slope < 0)) break;
-    const float change = -value / slope;
-    least += change;
-    if (!(change > kClose * trace)) break;
-  }
-  least = std::max(0.0f, least);
-  // The longest of what is across two rows.
-  Eigen::Matrix3f shifted = m;
-  shifted.diagonal().array() -= least;
-  const Eigen::Vector3f across[3] = {shifted.col(0).cross(shifted.col(1)), shifted.col(0).cross(shifted.col(2)),
-                                     shifted.col(1).cross(shifted.col(2))};
-  const auto* longest = std::max_element(std::begin(across), std::end(across), [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-    return a.squaredNorm() < b.squaredNorm();
-  });
-  vector = *longest / std::max(1e-30f, longest->norm());
-  return least;
-}
-
 void estimate_normals(const CoarseColumns& columns, int row, float pitch, CoarseGrid& coarse) {
   constexpr int kLanes = CoarseColumns::kLanes;
   const float reach = kNormalReach * kNormalRadius * static_cast<float>(coarse.stride) * pitch;  // for each metre of range
@@ -154,10 +124,11 @@ void estimate_normals(const CoarseColumns& columns, int row, float pitch, Coarse
       Eigen::Matrix3f scatter;
       scatter << of(4), of(5), of(6), of(5), of(7), of(8), of(6), of(8), of(9);
       scatter -= sum * sum.transpose() / count;
-      Eigen::Vector3f n;
-      const float least = least_eigenvalue(scatter, n);
-      coarse.normals[at] = n.dot(coarse.points[at]) > 0 ? -n : n;
-      coarse.variation[at] = least / std::max(1e-12f, scatter.trace());
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+      solver.computeDirect(scatter);
+      const Eigen::Vector3f n = solver.eigenvectors().col(0);
+      coarse.normals[at] = n.dot(coarse.points[at]) > 0 ? Eigen::Vector3f(-n) : n;
+      coarse.variation[at] = std::max(0.0f, solver.eigenvalues()[0]) / std::max(1e-12f, scatter.trace());
     }
   }
 }
@@ -166,7 +137,8 @@ void estimate_normals(const CoarseColumns& columns, int row, float pitch, Coarse
 float unsteadiness(const CoarseGrid& coarse) {
   constexpr std::size_t kApart = 2 * kNormalRadius + 1;
   constexpr double kShare = 0.1;
-  std::vector<float> differ;  // chords, squared
+  constexpr std::size_t kTooFew = 64;  // to tell
+  std::vector<float> differ;           // chords, squared
   const auto width = static_cast<std::size_t>(coarse.width), height = static_cast<std::size_t>(coarse.height);
   for (std::size_t v = 0; v + kApart < height; v += 2)
     for (std::size_t u = 0; u + kApart < width; u += 2) {
@@ -176,7 +148,7 @@ float unsteadiness(const CoarseGrid& coarse) {
         if (coarse.group[to] == coarse.group[at] && coarse.normals[to].squaredNorm() > 0)
           differ.push_back((coarse.normals[to] - coarse.normals[at]).squaredNorm());
     }
-  if (differ.size() < 64) return 0;
+  if (differ.size() < kTooFew) return 0;
   const auto flattest = differ.begin() + static_cast<std::ptrdiff_t>(kShare * static_cast<double>(differ.size()));
   std::nth_element(differ.begin(), flattest, differ.end());
   return std::clamp((std::sqrt(*flattest) - kSteady) / (kUnsteady - kSteady), 0.0f, 1.0f);
