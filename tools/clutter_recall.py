@@ -165,13 +165,14 @@ class Scene:
                 return None
         moved = (thing.points - about) @ rotation.T + np.append(to, bottom)
         places = moved[-thing.count :: 7, :2]
+        hull = hull_of(places)
         if how == "stacked":
             top = hull_of(below.flat)
             if np.mean([cv2.pointPolygonTest(top, (float(x * 1000), float(y * 1000)), True) > -12 for x, y in places[::8]]) < 0.8:
                 return None
-            taken = [p for p in self.placed if p.bottom >= bottom - 0.005 and shared(p.hull(), hull_of(places)) > 0]
+            taken = [p for p in self.placed if p.bottom >= bottom - 0.005 and shared(p.hull(), hull) > 0]
             return None if taken else (moved, bottom)
-        if any(shared(p.hull(), hull_of(places)) > (5 if how == "touching" else 0) for p in self.placed):
+        if any(shared(p.hull(), hull) > (5 if how == "touching" else 0) for p in self.placed):
             return None
         gaps = [cKDTree(p.places).query(places) for p in self.placed]
         if how == "apart":
@@ -238,12 +239,13 @@ class Scene:
 def compose(rng, frames, things, kind):
     while True:
         scene = Scene(frames[rng.integers(len(frames))])
-        wanted = len(scene.placed) + rng.integers(2, 7)
+        standing = len(scene.placed)
+        wanted = standing + rng.integers(2, 7)
         for _ in range(200):
             if len(scene.placed) >= wanted:
                 break
             scene.add(rng, things[rng.integers(len(things))], KINDS[rng.integers(3)] if kind == "mixed" else kind)
-        if len(scene.placed) > len(np.unique(scene.base.label[scene.base.label >= 2])):
+        if len(scene.placed) > standing:
             scene.cast_shadows()
             return scene
 

@@ -145,14 +145,18 @@ std::vector<int> contract(const CoarseGrid& coarse, const Patches& patches, Cont
   std::iota(parent.begin(), parent.end(), 0);
   std::vector<double> cells;  // of each cluster, at its lowest patch
   for (const Patch& patch : patches.list) cells.push_back(static_cast<double>(patch.cells));
-  const auto belong_together = [&](const std::pair<int, int>& pair, const Contact& contact) {
-    return contact.weight >
-           least * std::sqrt(std::min(cells[static_cast<std::size_t>(pair.first)], cells[static_cast<std::size_t>(pair.second)]));
+  const auto merely_touch = [&](const std::pair<int, int>& pair, double weight) {
+    const auto [one, other] = std::pair(cells[static_cast<std::size_t>(pair.first)], cells[static_cast<std::size_t>(pair.second)]);
+    return weight <= least * std::sqrt(std::min(one, other));
   };
   while (true) {
     auto best = contacts.end();
-    for (auto it = contacts.begin(); it != contacts.end(); ++it)
-      if (belong_together(it->first, it->second) && (best == contacts.end() || it->second.weight > best->second.weight)) best = it;
+    double most = 0;
+    for (auto it = contacts.begin(); it != contacts.end(); ++it) {
+      if (it->second.weight <= most || merely_touch(it->first, it->second.weight)) continue;
+      most = it->second.weight;
+      best = it;
+    }
     if (best == contacts.end()) return parent;
     const auto [keep, gone] = best->first;
     contacts.erase(best);

@@ -27,7 +27,7 @@ constexpr double kTopsTilt = 0.07;              // [rad] unless they are the top
 constexpr double kWalled = 0.35;                // of the border of a top, below which sides go down
 constexpr float kSidesFrom = 0.15f;             // of the way down: a board's edge ends before, sides go on,
 constexpr float kSidesTo = 0.85f;               // and what is lower may be the foot of something else
-constexpr float kFootTo = 1.5f;                  // what is seen so far down tells that nothing goes down before it
+constexpr float kFootTo = 1.5f;                 // what is seen so far down tells that nothing goes down before it
 constexpr int kPointsOfSide = 3;                // in each half of the way, about a cell of the border
 constexpr double kReasonableArea = 0.01;        // [m^2] nothing smaller carries anything
 constexpr std::size_t kPointsForNoise = 16384;  // of a frame are looked at
@@ -270,9 +270,9 @@ double walled_share(const PointGrid& grid, const Surface& top, double rise) {
 bool is_top(const PointGrid& grid, const Surface& top, const Surface& base, double max_height) {
   const auto rise = rise_above(top, base);
   if (!rise || *rise >= max_height) return false;
-  if (*rise >= kSeatHeight && top.piece_area >= kHighTopArea) return false;
-  if (top.piece_area < kTopArea && top.piece_length < kTopLength) return true;
-  if (*rise >= kSeatHeight) return false;
+  const bool low = *rise < kSeatHeight, one = top.piece_area < kTopArea && top.piece_length < kTopLength;
+  if (one) return low || top.piece_area < kHighTopArea;
+  if (!low) return false;
   const double tilt = std::acos(std::min(1.0, static_cast<double>(top.plane.normal.dot(base.plane.normal))));
   return (top.area <= kTopsShare * base.area || tilt > kTopsTilt) && walled_share(grid, top, *rise) > kWalled;
 }
