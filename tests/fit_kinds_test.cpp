@@ -308,6 +308,42 @@ TEST(FitFundamental, WhereNoSwarmFindsWhatPaysTheJointEndLooks) {
   EXPECT_GE(told_apart, 5U);
 }
 
+/// Two surfaces side by side, of `each` points, and `mismatches` from anywhere on them to anywhere on them [px].
+std::vector<double> side_by_side(unsigned seed, int each, int mismatches) {
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> noise(0, 0.8);
+  std::vector<double> rows;
+  for (int i = 0; i < 2 * each; ++i) {
+    const bool other = i >= each;
+    const double x = (other ? 330 : 150) + 170 * unit(engine), y = 150 + 200 * unit(engine);
+    // The one is seen from the front, the other goes off a little.
+    const double depth = other ? 1 + 1e-4 * (x - 330) : 1, by_x = noise(engine), by_y = noise(engine);
+    rows.insert(rows.end(), {x, y, (x + (other ? 55 : 40)) / depth + by_x, y / depth + by_y});
+  }
+  for (int i = 0; i < mismatches; ++i) {
+    for (const double left : {150.0, 190.0}) {
+      rows.push_back(left + 350 * unit(engine));
+      rows.push_back(150 + 200 * unit(engine));
+    }
+  }
+  return rows;
+}
+
+TEST(FitHomography, OfSurfacesSideBySideEachIsFoundAmongOutliers) {
+  // Each is what surrounds the other, and neighbours disagree for the mismatches among them.
+  for (const unsigned seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
+    FitOptions options;
+    options.model = ModelType::homography;
+    options.seed = seed;
+    auto fitter = Fitter::create(options);
+    ASSERT_TRUE(fitter) << fitter.error().message;
+    const auto result = fitter->fit(PointsView(std::span<const double>(side_by_side(seed, 38, 228)), 4));
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_EQ(result->models.size(), 2U) << seed;
+  }
+}
+
 TEST(FitFundamental, WrongCorrespondencesAreNoMotion) {
   std::mt19937_64 engine(1);
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {

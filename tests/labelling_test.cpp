@@ -151,6 +151,31 @@ TEST_F(Moves, NeighboursAgreeWhereModelsAreOfOneThingEach) {
   EXPECT_LT(labelling_->coherence(), 0.57);
 }
 
+TEST_F(Moves, ResidualsOfOneSurfaceAreNoiseAndOfTwoHaveAPattern) {
+  show({{0, 3, 0, kEach}});
+  ASSERT_TRUE(labelling_->start({{shifted(3, 0)}}));
+  EXPECT_GT(labelling_->evenness(0), 0.8);
+  EXPECT_EQ(labelling_->evenness(7), 1.0) << "no points, no pattern";
+  show({{0, 3, 0, kEach}, {130, -3, 0, kEach}});
+  ASSERT_TRUE(labelling_->start({{shifted(0, 0)}}));
+  ASSERT_EQ(labelling_->models().size(), 1U);
+  EXPECT_LT(labelling_->evenness(0), 0.6);
+}
+
+TEST_F(Moves, WhereNeighboursDisagreeAModelIsDearer) {
+  constexpr double kPrice = 5.5, kMore = 0.5;
+  const auto energy = [&](std::initializer_list<Patch> patches, double strewn) {
+    show(patches, {0.15, kPrice, 0, strewn});
+    EXPECT_TRUE(labelling_->start({{shifted(8, 0)}}));
+    return labelling_->energy();
+  };
+  const std::initializer_list<Patch> apart{{0, 8, 0, kEach}, {330, -8, 0, kEach}}, mixed{{0, 8, 0, kEach}, {0, -8, 0, kEach}};
+  EXPECT_EQ(energy(apart, kMore), energy(apart, 0));
+  const double dearer = energy(mixed, kMore) - energy(mixed, 0);
+  EXPECT_GT(dearer, kMore * kPrice / 2);
+  EXPECT_LE(dearer, kMore * kPrice + 1e-9);
+}
+
 TEST_F(Moves, OneSurfaceDoesNotComeApart) {
   show({{0, 3, 0, kEach}});
   ASSERT_TRUE(labelling_->start({{shifted(3, 0)}}));

@@ -90,6 +90,15 @@ class Linearised : public Base {
   /// The residual alone; a kind whose derivatives take long hides this.
   bool tell_residual(const double* row, const Position& theta, Linear& at) const { return itself().linearise(row, theta, at); }
 
+  bool residual(const WorkingPoints& points, std::uint32_t index, const Position& theta, std::span<double> components) const override {
+    std::array<double, kMaxDimension> row{};
+    for (int d = 0; d < points.dimension(); ++d) row[static_cast<std::size_t>(d)] = points.at(index, d);
+    Linear at;
+    if (!itself().tell_residual(row.data(), theta, at)) return false;
+    for (int c = 0; c < Components; ++c) components[static_cast<std::size_t>(c)] = at.residual[c];
+    return true;
+  }
+
   typename Base::Equations equations(const SupportRows& support, const Position& theta) const override {
     Eigen::Matrix<double, Parameters, Parameters> information = Eigen::Matrix<double, Parameters, Parameters>::Zero();
     Eigen::Matrix<double, Parameters, 1> gradient = Eigen::Matrix<double, Parameters, 1>::Zero();

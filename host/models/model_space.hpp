@@ -87,6 +87,11 @@ class ModelSpace {
   /// in closed form `support` is not looked at beyond its size.
   virtual double noise_variance(const WorkingPoints& points, const Weighted& support, const Position& theta, double squares) const;
 
+  /// Signed components of a point's residual, residual_components() of them, whitened; false where there are none or nobody asks for them.
+  virtual bool residual(const WorkingPoints&, std::uint32_t /*index*/, const Position&, std::span<double> /*components*/) const {
+    return false;
+  }
+
   /// Of a surface in space: where its normal points at what is near this point, not of unit length. Zero of other kinds.
   virtual Eigen::Vector3d outward(const Position&, const Eigen::Vector3d&) const { return Eigen::Vector3d::Zero(); }
 

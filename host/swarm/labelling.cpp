@@ -15,12 +15,14 @@ constexpr double kUnit = 4096;            // whole units of energy a point: what
 constexpr float kFarthest = 2;            // tau: no point is owned from farther away
 constexpr float kBeyond = 2 * kFarthest;  // tau, bent: of all that are farther away, for which it does not matter how far
 constexpr int kAlternations = 10;         // of labels and models
-constexpr int kFailures = 4;              // proposals in all that may join and not lower the energy before the rest is let be
+constexpr int kFailures = 4;              // proposals in all that may be tried and not lower the energy before the rest is let be
 constexpr double kPromising = 0.5;        // of a model's price that a proposal must save before it is fitted to its points
+constexpr double kPaying = 1.2;           // and that it must save when it is, before points are labelled with it
+constexpr double kTooDear = 0.6;          // and by which the energy with its labels may exceed the present one before models are refitted
 constexpr double kLeastFall = 1e-3;       // of the energy that counts as one
 constexpr double kHopeless = 0.5;         // of a model's price: what is dearer by that when refitted once is given up
 constexpr double kCoherent = 0.5;         // share of neighbours alike, beyond chance, from which smoothness counts in full
-constexpr int kCycles = 3;                // of expansions over all labels
+constexpr int kCycles = 1;                // of expansions over all labels: the next fit brings the next
 constexpr std::size_t kSmoothed = 6;      // nearest neighbours that a point would agree with
 
 }  // namespace
@@ -83,7 +85,7 @@ Expected<kernels::Reused<kernels::Reused<float>>> Labelling::measure(std::span<c
   return distances;
 }
 
-void Labelling::label(State& state) {
+void Labelling::label(State& state, std::span<const std::uint16_t> only) {
   using Cost = common::PottsEnergy::Cost;
   const std::size_t points = part_.index().size(), models = state.models.size();
   const bool new_edges = potts_smoothness_ != prices_.smoothness;
@@ -121,6 +123,7 @@ void Labelling::label(State& state) {
   // The newest model first: where labels are known already it is the one that changes them.
   kernels::Reused<std::uint16_t> order(models + 1);
   std::iota(order.rbegin(), order.rend(), std::uint16_t{0});
+  if (!only.empty()) order.assign(only.begin(), only.end());
   state.labels = std::move(nearest);
   if (potts.edges() > 0) potts.minimise(order, kCycles, state.labels, 1);
   state.energy = static_cast<double>(potts.energy(state.labels)) / kUnit + prices_.model * static_cast<double>(models);
@@ -175,11 +178,26 @@ void Labelling::remove(State& state, std::size_t model) {
   }
 }
 
-Expected<bool> Labelling::adopt(State&& with, double hopeless) {
+Expected<bool> Labelling::adopt(State&& with) {
   label(with);
-  if (auto done = alternate(with, hopeless); !done) return tl::unexpected(done.error());
+  if (auto done = alternate(with); !done) return tl::unexpected(done.error());
   if (!(with.energy < state_.energy - kLeastFall)) return false;
   state_ = std::move(with);
+  return true;
+}
+
+Expected<bool> Labelling::adopt_one_more(State&& with, double at_once, std::optional<std::size_t> parent) {
+  // What nobody owned is free again where the new model does not take it.
+  kernels::Reused<std::uint16_t> changed{static_cast<std::uint16_t>(with.models.size())};
+  if (parent) changed.push_back(static_cast<std::uint16_t>(*parent + 1));
+  changed.push_back(0);
+  label(with, changed);
+  if (with.energy > state_.energy + at_once * prices_.model) return false;
+  label(with);
+  if (auto done = alternate(with, state_.energy + kHopeless * prices_.model); !done) return tl::unexpected(done.error());
+  if (!(with.energy < state_.energy - kLeastFall)) return false;
+  state_ = std::move(with);
+  kept_.push_back(kJoined);
   return true;
 }
 
@@ -224,14 +242,15 @@ void Labelling::costs(std::span<float> costs) const {
   }
 }
 
-Expected<bool> Labelling::try_one(const models::Position& proposal, std::span<const float> distances) {
+Expected<bool> Labelling::try_one(models::Position proposal, kernels::Reused<float> distances) {
+  auto gain = fit_to_gain(proposal, distances);
+  if (!gain) return tl::unexpected(gain.error());
+  if (*gain < kPaying * prices_.model) return false;
   State with = state_;
-  with.models.push_back(proposal);
-  with.distances.emplace_back(distances.begin(), distances.end());
+  with.models.push_back(std::move(proposal));
+  with.distances.push_back(std::move(distances));
   with.fitted.push_back(0);
-  auto adopted = adopt(std::move(with), state_.energy + kHopeless * prices_.model);
-  if (adopted && *adopted) kept_.push_back(kJoined);
-  return adopted;
+  return adopt_one_more(std::move(with), kTooDear);
 }
 
 void Labelling::weigh_gains(std::span<const kernels::Reused<float>> distances, std::vector<double>& gains) const {
@@ -276,7 +295,9 @@ Expected<> Labelling::start(std::span<const models::Position> models) {
   const double wanted = std::exchange(prices_.smoothness, 0.0);
   label(state_);
   // Where models run through each other neighbours tell nothing, and agreement among them must not be asked for.
-  prices_.smoothness = wanted * std::min(1.0, coherence() / kCoherent);
+  const double together = std::min(1.0, coherence() / kCoherent);
+  prices_.smoothness = wanted * together;
+  prices_.model *= 1 + prices_.strewn * (1 - together);
   label(state_);
   return alternate(state_);
 }

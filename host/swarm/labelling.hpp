@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -27,7 +28,8 @@ std::uint64_t mark_of(std::span<const std::uint32_t> points);
 ///   E = sum_i D_i(l_i) + smoothness sum_(i,j) V(l_i, l_j) + model |{l_i}|,  D_i(k) = d_ik / tau where that is at most 2, D_i(0) = 1,
 ///   V(k, l) = [k != l], half that where one of them is 0
 ///
-/// with d / tau bent to log(1 + d / (bend tau)) / log(1 + 1 / bend) where the prices ask for it.
+/// with d / tau bent to log(1 + d / (bend tau)) / log(1 + 1 / bend) where the prices ask for it. Where neighbours agree little smoothness
+/// counts for less, and a model for more, if the prices say so: one that need not hold together explains strewn points more easily.
 ///
 /// Alternates labels (alpha-expansion) and least squares on each model's own points, and drops a model where that saves more than it
 /// explains; the energy never rises. Labels: 0 none, k the k-th of `models`, one a point of the cloud.
@@ -58,6 +60,9 @@ class Labelling {
   Expected<bool> split(std::size_t model, std::span<const models::Position> proposals);
   /// A proposal, fitted to the points of both, takes their place.
   Expected<bool> join(std::size_t one, std::size_t other, std::span<const models::Position> proposals);
+  /// Von Neumann's ratio of a model's residuals: half the mean square of what two neighbours of its points differ by, over the mean square
+  /// of one. 1 of noise, less where a pattern is left; 1 where there is too little to tell.
+  double evenness(std::size_t model) const;
   /// What ends of edges cost because one is this model's and the other that one's.
   double border(std::size_t one, std::size_t other) const;
   /// Marks the points of the cloud that a model owns with 1, and leaves the others as they are.
@@ -90,21 +95,28 @@ class Labelling {
   /// What a distance counts as, so that tau stays tau: small ones tell models apart, and large ones hardly. And back [data unit].
   float bent(float distance) const;
   float unbent(float cost) const;
-  /// The labels of the state's models, from those it has where they may stay; and the energy.
-  void label(State& state);
+  /// The labels of the state's models, from those it has where they may stay; and the energy. `only`: not empty where no other labels may
+  /// be taken.
+  void label(State& state, std::span<const std::uint16_t> only = {});
   Expected<bool> refit(State& state);
   Expected<bool> drop_one();
-  Expected<bool> try_one(const models::Position& proposal, std::span<const float> distances);
+  Expected<bool> try_one(models::Position proposal, kernels::Reused<float> distances);
+  /// Fits a proposal to what it wins of what the points cost as things stand; what it then saves, in units of tau.
+  Expected<double> fit_to_gain(models::Position& theta, kernels::Reused<float>& distances) const;
   double cost(std::size_t point) const;
   bool full() const noexcept { return most_ > 0 && state_.models.size() >= most_; }
   /// Labels and models in turn while the energy falls, or until it is found above `hopeless`.
   Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity());
   /// The state becomes `with`, labelled and fitted, where that lowers the energy.
-  Expected<bool> adopt(State&& with, double hopeless = std::numeric_limits<double>::infinity());
+  Expected<bool> adopt(State&& with);
+  /// The same with a model more, the last, made out of nothing or of `parent`. Given up, before anything is fitted, where with the labels
+  /// that it changes directly the energy is above the present one by `at_once` prices of a model.
+  Expected<bool> adopt_one_more(State&& with, double at_once, std::optional<std::size_t> parent = std::nullopt);
   static void remove(State& state, std::size_t model);
   /// Input indices of a model's points.
   kernels::Reused<std::uint32_t> owned(std::size_t model) const;
-  /// Fits a model to those points of the part that `takes` names; it stays where they do not determine one.
+  /// Tries a model on those points of the part that `takes` names, or some of them, if they are many; it stays where they do not
+  /// determine one.
   template <class Takes>
   void fit_to(Takes&& takes, models::Position& theta) const;
   /// What each proposal would save of what the points cost as things stand, in units of tau.

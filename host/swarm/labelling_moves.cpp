@@ -2,6 +2,8 @@
 // whether one through a few of its own points does better, whether it is two, and whether two are one.
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
 #include "host/swarm/labelling.hpp"
 #include "host/swarm/payment.hpp"
@@ -10,11 +12,13 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr std::size_t kTried = 3;      // proposals that are fitted, those that promise most
-constexpr int kFits = 2;               // of a proposal and what it wins, in turn
-constexpr double kHint = 0.3;          // of a model's price that a proposal must save before a model is taken for two
-constexpr double kWorthTrying = 0.75;  // of a model's price that the halves of a model must save before they are labelled
-constexpr double kWithinReach = 3;     // of what joining saves that a proposal may cost before it is fitted to the points of both
+constexpr std::size_t kTried = 2;       // proposals that are fitted, those that promise most
+constexpr std::size_t kFitted = 128;    // points of a model that is fitted to be tried
+constexpr int kFits = 2;                // of a proposal and what it wins, in turn
+constexpr double kHint = 0.3;           // of a model's price that a proposal must save before a model is taken for two
+constexpr double kWorthTrying = 0.75;   // of a model's price that the halves of a model must save before they are labelled
+constexpr double kHalvesTooDear = 1.2;  // of a model's price by which the energy may be higher with them before they are refitted
+constexpr double kWithinReach = 3;      // of what joining saves that a proposal may cost before it is fitted to the points of both
 
 /// The places of the `count` largest, the largest first.
 kernels::Reused<std::size_t> largest(std::span<const double> values, std::size_t count) {
@@ -43,6 +47,30 @@ void Labelling::mark_owned(std::size_t model, std::span<float> marks) const {
 
 std::uint64_t Labelling::owned_set(std::size_t model) const { return mark_of(owned(model)); }
 
+double Labelling::evenness(std::size_t model) const {
+  constexpr std::size_t kMostComponents = 2;
+  const std::size_t points = part_.index().size();
+  kernels::Reused<std::array<double, kMostComponents>> residual(points, {0, 0});
+  kernels::Reused<std::uint8_t> ours(points, 0);
+  double square = 0, owned = 0;
+  for (std::size_t i = 0; i < points; ++i) {
+    if (state_.labels[i] != model + 1) continue;
+    if (!ground_.space.residual(ground_.points, part_.index()[i], state_.models[model], residual[i])) continue;
+    ours[i] = 1;
+    ++owned;
+    for (const double component : residual[i]) square += component * component;
+  }
+  double apart = 0, pairs = 0;
+  for (const auto& [ends, count] : edges_) {
+    const auto one = static_cast<std::size_t>(ends.first), other = static_cast<std::size_t>(ends.second);
+    if (ours[one] == 0 || ours[other] == 0) continue;
+    ++pairs;
+    for (std::size_t c = 0; c < kMostComponents; ++c)
+      apart += (residual[one][c] - residual[other][c]) * (residual[one][c] - residual[other][c]);
+  }
+  return pairs > 0 && square > 0 ? apart / pairs / (2 * square / owned) : 1.0;
+}
+
 double Labelling::border(std::size_t one, std::size_t other) const {
   const std::size_t a = one + 1, b = other + 1;
   double sum = 0;
@@ -60,9 +88,30 @@ void Labelling::fit_to(Takes&& takes, models::Position& theta) const {
   for (std::size_t i = 0; i < part_.index().size(); ++i) {
     if (takes(i)) own.push_back(part_.index()[i]);
   }
+  const std::size_t fitted_to = std::min(own.size(), kFitted);
+  for (std::size_t k = 0; k < fitted_to; ++k) own[k] = own[k * own.size() / fitted_to];
+  own.resize(fitted_to);
   const kernels::Reused<double> weight(own.size(), 1.0);
   models::Position fitted = theta;
   if (ground_.space.refine(ground_.points, {own, weight}, fitted)) theta = std::move(fitted);
+}
+
+Expected<double> Labelling::fit_to_gain(models::Position& theta, kernels::Reused<float>& distances) const {
+  kernels::Reused<float> now(part_.index().size());
+  for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
+  double gain = saved(now, distances);
+  for (int fit = 0; fit < kFits; ++fit) {
+    models::Position next = theta;
+    fit_to([&](std::size_t i) { return distances[i] < now[i]; }, next);
+    auto measured = measure({&next, 1});
+    if (!measured) return tl::unexpected(measured.error());
+    const double better = saved(now, measured->front());
+    if (!(better > gain)) break;
+    gain = better;
+    theta = std::move(next);
+    distances = std::move(measured->front());
+  }
+  return gain / static_cast<double>(ground_.tau);
 }
 
 Expected<bool> Labelling::replace(std::size_t model, std::span<const models::Position> proposals) {
@@ -131,13 +180,8 @@ Expected<bool> Labelling::split(std::size_t model, std::span<const models::Posit
     with.models.push_back(halves[1]);
     with.distances.push_back(std::move(distances[1]));
     with.fitted.push_back(0);
-    auto adopted = adopt(std::move(with));
-    if (!adopted || !*adopted) {
-      if (!adopted) return adopted;
-      continue;
-    }
-    kept_.push_back(kJoined);
-    return true;
+    auto adopted = adopt_one_more(std::move(with), kHalvesTooDear, model);
+    if (!adopted || *adopted) return adopted;
   }
   return false;
 }

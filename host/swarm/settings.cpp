@@ -182,7 +182,7 @@ Settings for_kind(Settings s, ModelType type) {
   // In eight dimensions flight settles slowly; and points of one surface or body lie together in both images.
   s.renewal_share = 0.75;
   s.patience = 2;
-  s.prices = type == ModelType::homography ? LabelPrices{0.15, 5.5} : LabelPrices{0.25, 5.5, 0.8};
+  s.prices = type == ModelType::homography ? LabelPrices{0.15, 5.5} : LabelPrices{0.25, 5.5, 0.8, 0.5};
   // Seven points hit one body seldom: two searches that end sooner find more than one that takes its time.
   if (type == ModelType::fundamental) {
     s.searches = 2;

@@ -12,6 +12,7 @@ struct LabelPrices {
   double smoothness = 0;  ///< two neighbours with different labels, for each of the two that counts the other among its nearest
   double model = 0;       ///< a model that is used at all
   double bend = 0;        ///< of tau: beyond it what a distance costs grows as its logarithm does; 0: it grows evenly
+  double strewn = 0;      ///< share by which a model is dearer where neighbours agree no more than chance has it
 };
 
 /// Whom a particle follows beside itself.

@@ -13,6 +13,7 @@ namespace {
 constexpr int kRegroupings = 4;                  // rounds; what has not changed since it was looked at is not looked at again
 constexpr double kTogether = 0.57;               // of coherence: neighbours among strewn outliers agree less, those of bodies more
 constexpr int kSamples = 50, kJoinSamples = 20;  // of the points of one model, and of two
+constexpr double kEven = 1.05;                   // of von Neumann's ratio: above it a model's residuals are noise, and it is not two
 
 }  // namespace
 
@@ -72,9 +73,10 @@ Expected<bool> ShareOut::regroup_one(std::size_t model) {
   labelling_.mark_owned(model, marks);
   const kernels::Reused<models::Position> samples = samples_of(marks, kSamples, {});
   if (samples.empty()) return false;
+  const bool even = labelling_.evenness(model) > kEven;
   auto replaced = labelling_.replace(model, samples);
   if (!replaced) return replaced;
-  auto divided = labelling_.split(model, samples);
+  auto divided = even ? Expected<bool>(false) : labelling_.split(model, samples);
   if (!divided) return divided;
   return *replaced || *divided;
 }
@@ -132,14 +134,30 @@ Expected<bool> ShareOut::any_pays(bool any_found) {
   // its points lie together as those of one thing do.
   const bool together = labelling_.coherence() >= kTogether;
   if (together && any_found) return true;
-  left_.restore();
-  for (const models::Position& theta : labelling_.models()) {
-    Candidate candidate;
-    candidate.theta = theta;
-    if (auto done = candidates_.look(candidate, 0); !done) return tl::unexpected(done.error());
-    if ((together ? pays : pays_among_others)(candidate.support, problem_.settings, problem_.space(0).minimal_sample())) return true;
+  // Of two surfaces side by side each is what surrounds the other, so any one other model's points may be set aside. Not those of all: many
+  // models explain most of what is strewn, and each would then lie alone.
+  const std::size_t count = labelling_.models().size();
+  for (std::size_t model = 0; model < count; ++model) {
+    for (std::size_t aside = 0; aside < count; ++aside) {
+      auto paid = pays_beside(model, aside == model ? std::nullopt : std::optional(aside), together);
+      if (!paid || *paid) return paid;
+    }
   }
   return false;
+}
+
+Expected<bool> ShareOut::pays_beside(std::size_t model, std::optional<std::size_t> aside, bool together) {
+  left_.restore();
+  if (aside) {
+    kernels::Reused<float> theirs(problem_.points.size(), 0.0F);
+    labelling_.mark_owned(*aside, theirs);
+    for (std::size_t i = 0; i < theirs.size(); ++i) left_.caps()[i] *= 1 - theirs[i];
+  }
+  Candidate candidate;
+  candidate.theta = labelling_.models()[model];
+  if (auto done = candidates_.look(candidate, 0); !done) return tl::unexpected(done.error());
+  candidate.support.unexplained = problem_.points.finite_count();
+  return (together ? pays : pays_among_others)(candidate.support, problem_.settings, problem_.space(0).minimal_sample());
 }
 
 Expected<> ShareOut::describe(std::size_t of, std::span<const std::uint16_t> labels, Model& model) const {
