@@ -128,9 +128,11 @@ class Estimate {
         most = *weight;
         best = std::move(*settled);
       }
-      // A threshold that starts generous and stays or even widens may follow what surrounds the models.
+      // A threshold that starts generous and stays or even widens may follow what surrounds the models. Several narrow ones are what it
+      // must stand against then.
       if (narrowed) break;
       ++starts;
+      in_doubt_ = true;
     }
     return best;
   }
@@ -142,7 +144,7 @@ class Estimate {
     bool widened = false;
     while (rounds_ < kRounds) {
       FitResult result;
-      auto found = search(now.threshold, now.models.empty() ? kFirstModels : kModels, result);
+      auto found = search(now.threshold, now.models.empty() && !in_doubt_ ? kFirstModels : kModels, result);
       if (!found) return tl::unexpected(found.error());
       if (found->empty()) {
         if (now.models.empty()) {
@@ -202,8 +204,9 @@ class Estimate {
     return {};
   }
 
-  /// How far from chance the models are at the threshold, all together: less the logarithms of their false alarms. What surrounds a model
-  /// is at least as dense as the cloud would be if its points were strewn evenly, so that a slab as wide as the cloud means nothing.
+  /// How far from chance it is that so many points are within the threshold of any of the models: less the logarithm of their false alarms.
+  /// What surrounds them is at least as dense as the cloud would be if its points were strewn evenly, so that a slab as wide as the cloud
+  /// means nothing.
   Expected<double> significance(const NoiseScale& scale) {
     const auto tau = static_cast<float>(scale.threshold);
     const kernels::Reused<float> allowed = allowed_by(in_.spread, tau);
@@ -219,15 +222,17 @@ class Estimate {
       wide += each;
     }
     if (wide > kWidest * width_ * static_cast<double>(in_.points.finite_count())) return 0.0;
-    double sum = 0;
+    int sample = 0;
+    std::fill(nearest_.begin(), nearest_.end(), std::numeric_limits<float>::infinity());
     for (const Known& model : scale.models) {
       const models::ModelSpace& space = *kinds_[model.kind].space;
       if (auto done = weigh(ground.of(space), model.theta, {}, distances_); !done) return tl::unexpected(done.error());
-      for (std::size_t i = 0; i < distances_.size(); ++i) distances_[i] *= tau / ground.allowed_at(i);
-      const Support support = count_support(distances_, caps, tau);
-      if (support.inliers() > 0) sum -= std::min(0.0, log_false_alarms(support, space.minimal_sample(), evenly));
+      take_nearer(distances_, nearest_);
+      sample += space.minimal_sample();
     }
-    return sum;
+    for (std::size_t i = 0; i < nearest_.size(); ++i) nearest_[i] *= tau / ground.allowed_at(i);
+    const Support support = count_support(nearest_, caps, tau);
+    return -std::min(0.0, log_false_alarms(support, sample, evenly * static_cast<double>(scale.models.size())));
   }
 
   Ground ground_at(double tau, std::span<const float> allowed) const {
@@ -245,8 +250,9 @@ class Estimate {
   Input in_;
   std::vector<Kind> kinds_;
   kernels::Reused<float> distances_, nearest_, caps_;
-  double width_;    // of the cloud, were its points strewn evenly [data unit]
-  int rounds_ = 0;  // of search, so far
+  double width_;           // of the cloud, were its points strewn evenly [data unit]
+  int rounds_ = 0;         // of search, so far
+  bool in_doubt_ = false;  // whether a threshold has been found that may be too wide
 };
 
 }  // namespace

@@ -25,16 +25,24 @@ class Search {
   /// Swarms of kinds that say so end soon, until told otherwise.
   void end_soon(bool soon) noexcept { soon_ = soon; }
   bool ends_soon() const noexcept { return soon_; }
+  /// After so many swarms that found nothing the next begin with more samples: what is left is hit by fewer of them.
+  void look_harder(int times) noexcept { vain_ = times; }
   /// Where the joint end chooses from them: what particles of all swarms knew.
   const std::vector<models::Position>& proposals() const noexcept { return proposals_; }
 
  private:
+  Settings settings_of(std::size_t kind) const;
+  /// What saves most may run across several surfaces, and not pay where one of these would: of the bests of other stretches of the ring the
+  /// candidate becomes the first that does, away from what was found; false if none does.
+  Expected<bool> look_beside(const Swarm& swarm, Candidate& candidate) const;
+
   const Problem& problem_;
   const Unexplained& left_;
   Pilot& pilot_;
   const Candidates& candidates_;
   Worth worth_;
   bool soon_ = false;
+  int vain_ = 0;
   std::vector<models::Position> proposals_;
 };
 

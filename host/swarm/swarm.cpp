@@ -111,6 +111,20 @@ void Swarm::set_off() {
   keep(own_fitness_);
 }
 
+kernels::Reused<std::size_t> Swarm::best_of_stretches() const {
+  constexpr std::size_t kStretches = 6;
+  const std::size_t particles = own_fitness_.size();
+  kernels::Reused<std::size_t> bests;
+  for (std::size_t k = 0; k < kStretches; ++k) {
+    const std::size_t first = k * particles / kStretches, last = (k + 1) * particles / kStretches;
+    if (first == last) continue;
+    const auto stretch = std::span(own_fitness_).subspan(first, last - first);
+    bests.push_back(first + static_cast<std::size_t>(std::min_element(stretch.begin(), stretch.end()) - stretch.begin()));
+  }
+  std::stable_sort(bests.begin(), bests.end(), [&](std::size_t a, std::size_t b) { return own_fitness_[a] < own_fitness_[b]; });
+  return bests;
+}
+
 void Swarm::remember() {
   std::size_t best = positions_.size();
   for (std::size_t j = 0; j < positions_.size(); ++j) {

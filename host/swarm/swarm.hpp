@@ -55,6 +55,8 @@ class Swarm {
   std::span<const double> fitness() const noexcept { return fitness_; }
   std::span<const models::Position> own_bests() const noexcept { return own_best_; }
   std::span<const double> own_fitness() const noexcept { return own_fitness_; }
+  /// Of each stretch of the ring, six in all, the particle that knows the best place; the fittest first. Neighbours on the ring know alike.
+  kernels::Reused<std::size_t> best_of_stretches() const;
 
  private:
   void remember();

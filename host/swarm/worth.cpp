@@ -12,17 +12,16 @@
 namespace swarmfit::swarm {
 namespace {
 
-constexpr double kAlong = 0.8;         // cosine of the angle between a point's normal and the model's
-constexpr std::size_t kStretches = 6;  // of a swarm's ring, whose bests are looked at
-constexpr double kHeld = 0.4;          // share of its points that must lie along it, times that of neighbours alike,
-constexpr double kHeldPerBeside = 2;   // and so much more for each point beside it, of its own
-constexpr std::size_t kBesides = 8;    // nearest neighbours of a point that are asked whose they are
-constexpr double kThin = 6;            // tau: a cylinder that is wider lies about no box on all sides
-constexpr std::size_t kNext = 4;       // nearest neighbours of a point along it that are asked how far off they are
-constexpr double kEven = 0.8;          // von Neumann's ratio: below, they are off to the same side
-constexpr double kBent = 0.15;         // tau: root mean square of how far a plane's points bend away from it: below, they lie flat,
-constexpr std::size_t kFewest = 32;    // of these: fewer bend by chance, or not,
-constexpr double kGoesOn = 0.1;        // unless so many times as many are right beside it: the surface goes on there, bent
+constexpr double kAlong = 0.8;        // cosine of the angle between a point's normal and the model's
+constexpr double kHeld = 0.4;         // share of its points that must lie along it, times that of neighbours alike,
+constexpr double kHeldPerBeside = 2;  // and so much more for each point beside it, of its own
+constexpr std::size_t kBesides = 8;   // nearest neighbours of a point that are asked whose they are
+constexpr double kThin = 6;           // tau: a cylinder that is wider lies about no box on all sides
+constexpr std::size_t kNext = 4;      // nearest neighbours of a point along it that are asked how far off they are
+constexpr double kEven = 0.8;         // von Neumann's ratio: below, they are off to the same side
+constexpr double kBent = 0.15;        // tau: root mean square of how far a plane's points bend away from it: below, they lie flat,
+constexpr std::size_t kFewest = 32;   // of these: fewer bend by chance, or not,
+constexpr double kGoesOn = 0.1;       // unless so many times as many are right beside it: the surface goes on there, bent
 
 /// How many of a model's points lie along it, of those whose surface is known; one is added so that no points are no cause for doubt.
 class Along {
@@ -177,15 +176,9 @@ double Worth::bare_saving(std::span<const float> caps, std::span<const float> di
 }
 
 Expected<> Worth::choose(const Swarm& swarm, Candidate& candidate) const {
-  // Neighbours on the ring know alike: one of each stretch is enough.
-  const std::size_t particles = swarm.own_bests().size();
   kernels::Reused<models::Placed> known{{&problem_.space(candidate.kind), swarm.best()}};
-  for (std::size_t k = 0; k < kStretches; ++k) {
-    const std::size_t first = k * particles / kStretches, last = (k + 1) * particles / kStretches;
-    const auto stretch = swarm.own_fitness().subspan(first, last - first);
-    if (stretch.empty()) continue;
-    const auto best = static_cast<std::size_t>(std::min_element(stretch.begin(), stretch.end()) - stretch.begin());
-    known.push_back({&problem_.space(candidate.kind), swarm.own_bests()[first + best]});
+  for (const std::size_t particle : swarm.best_of_stretches()) {
+    known.push_back({&problem_.space(candidate.kind), swarm.own_bests()[particle]});
   }
   const auto distances = measure(problem_.part_ground, known);
   if (!distances) return tl::unexpected(distances.error());
