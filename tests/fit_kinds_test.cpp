@@ -496,6 +496,43 @@ int circles_found(unsigned scene) {
   return found;
 }
 
+TEST(FitCircles, AreFoundAmongMoreThanTwiceAsManyOutliers) {
+  // Each holds a seventeenth of the points: one random sample in 4600 is of one circle.
+  struct Ring {
+    double x, y, radius;
+  };
+  static constexpr Ring kRings[] = {{0.3, 0.3, 0.25}, {0.7, 0.35, 0.2}, {0.4, 0.65, 0.3}, {0.7, 0.7, 0.15}, {0.5, 0.5, 0.1}};
+  constexpr double kSigma = 0.0025;
+  std::size_t found = 0, all = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    std::normal_distribution<double> noise(0, kSigma);
+    std::vector<double> xy;
+    for (const Ring& ring : kRings) {
+      for (int i = 0; i < 50; ++i) {
+        const double angle = 6.283185307179586 * unit(random), r = ring.radius + noise(random);
+        xy.insert(xy.end(), {ring.x + r * std::cos(angle), ring.y + r * std::sin(angle)});
+      }
+    }
+    for (int i = 0; i < 2 * 583; ++i) xy.push_back(unit(random));
+    FitOptions options;
+    options.model = ModelType::circle2d;
+    options.threshold = 2.5 * kSigma;
+    options.seed = seed;
+    options.backend = "cpu";
+    const auto result = fit(PointsView(std::span<const double>(xy), 2), options);
+    ASSERT_TRUE(result) << result.error().message;
+    for (const Ring& ring : kRings) {
+      ++all;
+      found += std::any_of(result->models.begin(), result->models.end(), [&](const Model& model) {
+        return (Eigen::Vector3d(model.parameters) - Eigen::Vector3d(ring.x, ring.y, ring.radius)).cwiseAbs().maxCoeff() < 2 * kSigma;
+      });
+    }
+  }
+  EXPECT_GE(found, all * 9 / 10) << "of " << all << "; 41 where all swarms began with as few samples";
+}
+
 // A wide circle through outliers saves as much as a small true one; two of them in a row end the search.
 TEST(FitCircles, SmallOnesAreFoundBesideWideOnesOfChance) {
   int found = 0;

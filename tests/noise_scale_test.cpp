@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <span>
 #include <utility>
@@ -68,6 +69,50 @@ std::vector<double> circles(unsigned seed) {
     xy.push_back(2.4 * unit(rng) - 1.2);
   }
   return xy;
+}
+
+/// Four stairs of 50 points each across the unit square, and `strewn` more points.
+std::vector<double> stairs(unsigned seed, int strewn) {
+  std::mt19937 rng(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> noise(0, kSigma);
+  std::vector<double> xy;
+  for (int i = 0; i < 200; ++i) {
+    const double stair = i / 50;
+    xy.push_back(0.25 * (stair + unit(rng)));
+    xy.push_back(0.2 * (stair + 1) + noise(rng));
+  }
+  for (int i = 0; i < 2 * strewn; ++i) xy.push_back(unit(rng));
+  return xy;
+}
+
+/// How many lines a fit to them finds, under an estimated threshold or this one.
+std::size_t stairs_found(unsigned seed, int strewn, std::optional<double> threshold) {
+  const std::vector<double> xy = stairs(seed, strewn);
+  FitOptions options;
+  options.model = ModelType::line2d;
+  options.seed = seed;
+  options.threshold = threshold;
+  options.backend = "cpu";
+  const auto result = fit(PointsView(std::span<const double>(xy), 2), options);
+  EXPECT_TRUE(result) << result.error().message;
+  return result ? result->models.size() : 0;
+}
+
+TEST(NoiseScale, FourNarrowStairsAreNotOneWideLine) {
+  // One slab along the flight of stairs holds all of their points, and next to it there is nothing.
+  int four = 0, fits = 0;
+  for (const int strewn : {0, 20, 200}) {
+    for (unsigned seed = 1; seed <= 12; ++seed, ++fits) four += stairs_found(seed, strewn, {}) == 4 ? 1 : 0;
+  }
+  EXPECT_GE(four, fits - 4) << "of " << fits << "; 17 where each line was weighed by itself";
+}
+
+TEST(FitLines, WhatPaysIsFoundBesideWhatSavesMore) {
+  // A line along the flight of stairs saves more than a stair does, and does not pay: what is next to it is as dense.
+  for (const int strewn : {100, 200, 400}) {
+    for (unsigned seed = 1; seed <= 12; ++seed) EXPECT_EQ(stairs_found(seed, strewn, 2.5 * kSigma), 4U) << strewn << ", " << seed;
+  }
 }
 
 TEST(NoiseScale, CirclesAmongOutliersSeldomMisleadIt) {

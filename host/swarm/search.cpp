@@ -35,7 +35,7 @@ Settings Search::settings_of(std::size_t kind) const {
 
 Expected<bool> Search::look_beside(const Swarm& swarm, Candidate& candidate) const {
   const Settings& settings = problem_.kinds[candidate.kind].settings;
-  if (!settings.joint || problem_.shares_out() || problem_.part_searched || problem_.kinds.size() > 1) return false;
+  if (!settings.refine || problem_.shares_out() || problem_.part_searched || problem_.kinds.size() > 1) return false;
   for (const std::size_t particle : swarm.best_of_stretches()) {
     Candidate other;
     other.kind = candidate.kind;
