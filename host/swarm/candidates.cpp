@@ -83,7 +83,16 @@ Expected<> Candidates::sink(const Candidate& candidate, std::vector<float>& caps
 }
 
 bool Candidates::pays(const Candidate& candidate) const {
-  return swarm::pays(candidate.support, problem_.kinds[candidate.kind].settings, problem_.space(candidate.kind).minimal_sample());
+  const Settings& settings = problem_.kinds[candidate.kind].settings;
+  const int sample = problem_.space(candidate.kind).minimal_sample();
+  if (swarm::pays(candidate.support, settings, sample)) return true;
+  // Few points in the plane, where all lines cross: there what others have taken decides.
+  const bool crossed = problem_.points.dimension() == 2 && !problem_.part_searched && problem_.allowed.empty() && settings.refine &&
+                       settings.deflation == Deflation::residual && !left_.near().beside.empty();
+  if (!crossed) return false;
+  kernels::Reused<float> caps(problem_.points.size());
+  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = problem_.points.finite(i) ? problem_.tau : 0.0F;
+  return pays_across(candidate.support, count_support(candidate.distances, caps, problem_.tau), settings, sample);
 }
 
 Expected<> Candidates::deflate(const Candidate& candidate) const {

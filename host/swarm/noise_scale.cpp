@@ -28,7 +28,8 @@ constexpr double kWidest = 0.25;         // of the cloud's width: a slab that ha
 constexpr double kWidened = 2;           // times what a search started with: it went the wrong way, or started far too narrow
 constexpr double kDoubt = 1.5;           // times as significant as another must such a one be
 constexpr int kStarts = 3;               // thresholds that a search may start with, each half the one before
-constexpr std::size_t kModels = 4;       // the most prominent ones tell the scale
+constexpr std::size_t kModels = 4;       // the most prominent ones tell the scale,
+constexpr std::size_t kFlatModels = 12;  // and of lines more: their swarms are short, and what they find opens the fit's list
 constexpr std::size_t kFirstModels = 2;  // at first, when the scale is not known
 
 }  // namespace
@@ -144,7 +145,7 @@ class Estimate {
     bool widened = false;
     while (rounds_ < kRounds) {
       FitResult result;
-      auto found = search(now.threshold, now.models.empty() && !in_doubt_ ? kFirstModels : kModels, result);
+      auto found = search(now.threshold, now.models.empty() && !in_doubt_ ? kFirstModels : most_models(), result);
       if (!found) return tl::unexpected(found.error());
       if (found->empty()) {
         if (now.models.empty()) {
@@ -162,6 +163,8 @@ class Estimate {
     }
     return now;
   }
+
+  std::size_t most_models() const { return kinds_.size() == 1 && kinds_.front().space->closed_form() ? kFlatModels : kModels; }
 
   Expected<std::vector<models::Placed>> search(double tau, std::size_t models, FitResult& result) {
     resolve(kinds_, in_.options, in_.finite_points, tau);

@@ -76,6 +76,12 @@ bool pays_among_others(const Support& support, const Settings& settings, int min
   return log_false_alarms(whole, minimal_sample) < kLogFalseAlarms;
 }
 
+bool pays_across(const Support& support, const Support& whole, const Settings& settings, int minimal_sample) {
+  constexpr double kNearly = 3;  // log of false alarms: chance alone seldom comes so near
+  return support.inliers() >= settings.min_inliers && 2 * support.inliers() >= whole.inliers() &&
+         log_false_alarms(support, minimal_sample) <= kNearly && pays_among_others(whole, settings, minimal_sample);
+}
+
 bool pays(const Support& support, const Settings& settings, int minimal_sample) {
   if (!has_enough(support, settings)) return false;
   if (pays_among_others(support, settings, minimal_sample)) return true;

@@ -53,4 +53,8 @@ bool pays(const Support& support, const Settings& settings, int minimal_sample);
 /// The same by what surrounds the candidate alone, whose own ring says little once it was fitted to points that were chosen with it.
 bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample);
 
+/// What was found and runs across the candidate has taken points of it, and as many of its surroundings. `whole` is its support by all
+/// points, be they explained or not: the candidate pays by these where half of its points are nobody else's, and these alone nearly pay.
+bool pays_across(const Support& support, const Support& whole, const Settings& settings, int minimal_sample);
+
 }  // namespace swarmfit::swarm
