@@ -13,6 +13,7 @@ namespace swarmfit::swarm {
 namespace {
 
 constexpr std::size_t kRun = std::size_t{1} << 18;  // points whose distances are in memory at a time
+constexpr double kSparse = 0.7;                     // of the density that points strewn evenly would have, at the sparsest
 constexpr int kCurvedRounds = 4;                    // of refinement on a part: each takes Gauss-Newton steps, and one on all points follows
 
 }  // namespace
@@ -85,14 +86,23 @@ Expected<> Candidates::sink(const Candidate& candidate, std::vector<float>& caps
 bool Candidates::pays(const Candidate& candidate) const {
   const Settings& settings = problem_.kinds[candidate.kind].settings;
   const int sample = problem_.space(candidate.kind).minimal_sample();
-  if (swarm::pays(candidate.support, settings, sample)) return true;
+  if (swarm::pays(candidate.support, settings, sample, strewn(candidate))) return true;
   // Few points in the plane, where all lines cross: there what others have taken decides.
   const bool crossed = problem_.points.dimension() == 2 && !problem_.part_searched && problem_.allowed.empty() && settings.refine &&
                        settings.deflation == Deflation::residual && !left_.near().beside.empty();
   if (!crossed) return false;
   kernels::Reused<float> caps(problem_.points.size());
   for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = problem_.points.finite(i) ? problem_.tau : 0.0F;
-  return pays_across(candidate.support, count_support(candidate.distances, caps, problem_.tau), settings, sample);
+  return pays_across(candidate.support, count_support(candidate.distances, caps, problem_.tau), settings, sample, strewn(candidate));
+}
+
+bool Candidates::pays_among_others(const Candidate& candidate) const {
+  return swarm::pays_among_others(candidate.support, problem_.kinds[candidate.kind].settings,
+                                  problem_.space(candidate.kind).minimal_sample(), strewn(candidate));
+}
+
+double Candidates::strewn(const Candidate& candidate) const {
+  return problem_.settings.refine ? kSparse * problem_.strewn_along(candidate.kind, candidate.theta) : 0.0;
 }
 
 Expected<> Candidates::deflate(const Candidate& candidate) const {

@@ -40,6 +40,8 @@ class Candidates {
   Expected<> look(Candidate& candidate, int rounds) const;
   /// Does it pay for itself?
   bool pays(const Candidate& candidate) const;
+  /// By what surrounds it alone?
+  bool pays_among_others(const Candidate& candidate) const;
   /// What the candidate explains sinks out of the caps.
   Expected<> deflate(const Candidate& candidate) const;
   /// Where a plane that was found runs across two surfaces, one of these takes its place; the other is what is returned.
@@ -48,6 +50,9 @@ class Candidates {
  private:
   /// The candidate's support, by its distances.
   Expected<> count(Candidate& candidate, std::span<const float> caps, const Near& near) const;
+  /// Of the points, the share that chance puts within tau of the candidate at least. An empty gap on either side is chance as well, and many
+  /// lines are looked at.
+  double strewn(const Candidate& candidate) const;
   DeadZone dead_zone(const Candidate& candidate, std::span<const float> caps) const;
   Expected<> sink(const Candidate& candidate, std::vector<float>& caps, Near& near) const;
   /// visit(first, distances) for runs of points, from the first to the last.

@@ -67,29 +67,30 @@ std::size_t on_whole_cloud(std::size_t n, const Settings& settings) {
 
 }  // namespace
 
-bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample) {
+bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample, double strewn) {
   if (!has_enough(support, settings)) return false;
   Support whole;
   whole.unexplained = on_whole_cloud(support.unexplained, settings);
   std::transform(support.slabs.begin(), support.slabs.end(), whole.slabs.begin(),
                  [&](std::size_t n) { return on_whole_cloud(n, settings); });
-  return log_false_alarms(whole, minimal_sample) < kLogFalseAlarms;
+  return log_false_alarms(whole, minimal_sample, strewn * static_cast<double>(whole.unexplained)) < kLogFalseAlarms;
 }
 
-bool pays_across(const Support& support, const Support& whole, const Settings& settings, int minimal_sample) {
+bool pays_across(const Support& support, const Support& whole, const Settings& settings, int minimal_sample, double strewn) {
   constexpr double kNearly = 3;  // log of false alarms: chance alone seldom comes so near
   return support.inliers() >= settings.min_inliers && 2 * support.inliers() >= whole.inliers() &&
-         log_false_alarms(support, minimal_sample) <= kNearly && pays_among_others(whole, settings, minimal_sample);
+         log_false_alarms(support, minimal_sample, strewn * static_cast<double>(support.unexplained)) <= kNearly &&
+         pays_among_others(whole, settings, minimal_sample, strewn);
 }
 
-bool pays(const Support& support, const Settings& settings, int minimal_sample) {
+bool pays(const Support& support, const Settings& settings, int minimal_sample, double strewn) {
   if (!has_enough(support, settings)) return false;
-  if (pays_among_others(support, settings, minimal_sample)) return true;
+  if (pays_among_others(support, settings, minimal_sample, strewn)) return true;
   if (2 * support.beside > support.inliers()) return false;
   const auto inner = static_cast<double>(on_whole_cloud(support.inner, settings));
+  const auto unexplained = static_cast<double>(on_whole_cloud(support.unexplained, settings));
   const double ring = static_cast<double>(on_whole_cloud(support.inliers(), settings)) - inner;
-  return log_false_alarms(static_cast<double>(on_whole_cloud(support.unexplained, settings)), inner, ring, minimal_sample) <
-         kLogFalseAlarms;
+  return log_false_alarms(unexplained, inner, std::max(ring, strewn * unexplained / 2), minimal_sample) < kLogFalseAlarms;
 }
 
 }  // namespace swarmfit::swarm

@@ -47,14 +47,15 @@ Support count_support(std::span<const float> distances, std::span<const float> c
 double log_false_alarms(const Support& support, int minimal_sample, double least_background = 0);
 
 /// Two surfaces side by side are each other's surroundings, and neither would pay. So the ring from tau / 2 to tau may be the background as
-/// well, where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise.
-bool pays(const Support& support, const Settings& settings, int minimal_sample);
+/// well, where the candidate is not beside a found model: there, a peak may be a layer of that model's own noise. `strewn`, here and below:
+/// share of the unexplained points that chance puts into a slab at least, however empty the surroundings.
+bool pays(const Support& support, const Settings& settings, int minimal_sample, double strewn = 0);
 
 /// The same by what surrounds the candidate alone, whose own ring says little once it was fitted to points that were chosen with it.
-bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample);
+bool pays_among_others(const Support& support, const Settings& settings, int minimal_sample, double strewn = 0);
 
 /// What was found and runs across the candidate has taken points of it, and as many of its surroundings. `whole` is its support by all
 /// points, be they explained or not: the candidate pays by these where half of its points are nobody else's, and these alone nearly pay.
-bool pays_across(const Support& support, const Support& whole, const Settings& settings, int minimal_sample);
+bool pays_across(const Support& support, const Support& whole, const Settings& settings, int minimal_sample, double strewn);
 
 }  // namespace swarmfit::swarm

@@ -57,18 +57,13 @@ double Pilot::loss_of_nothing(std::span<const float> caps) const {
 
 Background Pilot::background(std::size_t kind, std::span<const float> caps) const {
   if (problem_.space(kind).type() != ModelType::circle2d || problem_.part_searched) return {};
-  constexpr double kLargest = std::numeric_limits<double>::max();
-  Background evenly{0, {kLargest, kLargest}, {-kLargest, -kLargest}};
+  Background evenly{0, problem_.box.low, problem_.box.high};
   double square = 0;
   for (std::size_t i = 0; i < caps.size(); ++i) {
-    if (!problem_.points.finite(i)) continue;
-    const Eigen::Vector2d p = problem_.points.point<2>(i);
-    evenly.low = evenly.low.cwiseMin(p);
-    evenly.high = evenly.high.cwiseMax(p);
-    square += static_cast<double>(caps[i]) * static_cast<double>(caps[i]);
+    if (problem_.points.finite(i)) square += static_cast<double>(caps[i]) * static_cast<double>(caps[i]);
   }
   // A point d from the curve saves c - d: the square of its cap in all, on both sides, over the area.
-  const double area = (evenly.high - evenly.low).prod() * problem_.points.frame().scale;
+  const double area = problem_.box.area() * problem_.points.frame().scale;
   if (area > 0) evenly.per_length = square / area;
   return evenly;
 }

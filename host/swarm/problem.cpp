@@ -1,6 +1,8 @@
 #include "host/swarm/problem.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "host/swarm/noise_model.hpp"
 
@@ -9,6 +11,18 @@ namespace {
 
 constexpr int kFullRounds = 1;                             // of refinement on all points, where it was done on a part of them before
 constexpr std::size_t kMostListed = std::size_t{1} << 20;  // points, of which distances are kept
+
+Box box_of(const models::WorkingPoints& points) {
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  Box box{{kLargest, kLargest}, {-kLargest, -kLargest}};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!points.finite(i)) continue;
+    const Eigen::Vector2d p = points.point<2>(i);
+    box.low = box.low.cwiseMin(p);
+    box.high = box.high.cwiseMax(p);
+  }
+  return box;
+}
 
 }  // namespace
 
@@ -29,6 +43,15 @@ Problem::Problem(kernels::FitnessEvaluator& of, std::span<const Kind> looked_for
       part_ground{.evaluator = evaluator, .space = *kinds.front().space, .points = points, .tau = tau, .part = &part} {
   if (!allowed.empty()) part.gather(allowed, part_allowed);
   part_ground.allow(part_allowed);
+  if (points.dimension() == 2) box = box_of(points);
+}
+
+double Problem::strewn_along(std::size_t kind, const models::Position& theta) const {
+  if (points.dimension() != 2 || !allowed.empty() || !(box.area() > 0)) return 0;
+  const double slab = 2 * static_cast<double>(tau) / points.frame().scale;  // [working frame]
+  // A line crosses a square as spread as they are once; of a curve what lies in the box counts.
+  const double across = std::sqrt(12.0 / points.dimension()), within = space(kind).length_within(theta, box.low, box.high);
+  return std::min(1.0, space(kind).closed_form() ? slab / across : slab * within / box.area());
 }
 
 std::span<const float> Problem::levelled(std::span<const float> values, std::vector<float>& room) const {

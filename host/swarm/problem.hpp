@@ -23,6 +23,13 @@ namespace swarmfit::swarm {
 /// With more points, what is gained by looking closer is nothing beside what they say together.
 inline constexpr std::size_t kFewPoints = 2048;
 
+/// What lies between two corners of the plane.
+struct Box {
+  Eigen::Vector2d low{0, 0}, high{0, 0};
+
+  double area() const noexcept { return (high - low).prod(); }
+};
+
 struct Problem {
   /// `points`: the whole cloud, or a thinned one of the size that the settings of `kinds` were resolved for. `part` is what samples are
   /// drawn from, and where the settings say so what swarms search. `kinds`, `points` and `part` must outlive this. `spread`: how many times
@@ -71,6 +78,10 @@ struct Problem {
   /// Corner of the loss that models of this kind are refined with last, of tau: 0 for the least absolute deviations, 1 for least squares.
   float corner(const models::ModelSpace& of) const noexcept;
 
+  /// Share of points strewn evenly over the cloud that would be within tau of a line or circle; 0 of other kinds, and where each point has
+  /// a threshold of its own.
+  double strewn_along(std::size_t kind, const models::Position& theta) const;
+
   kernels::FitnessEvaluator& evaluator;
   std::span<const Kind> kinds;
   std::size_t asked;  ///< the first so many of them; the rest are hidden
@@ -83,6 +94,7 @@ struct Problem {
   float tau;                                     ///< [data unit]
   kernels::Reused<float> allowed, part_allowed;  ///< tau of each point, and of the part's; empty: tau for all
   Ground ground, part_ground;                    ///< all points, and the part; as the first kind has it
+  Box box;                                       ///< about the finite points, of two columns [working frame]
 };
 
 }  // namespace swarmfit::swarm

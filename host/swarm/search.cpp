@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <utility>
 
-#include "host/swarm/payment.hpp"
 #include "host/swarm/swarm.hpp"
 
 namespace swarmfit::swarm {
@@ -34,17 +33,14 @@ Settings Search::settings_of(std::size_t kind) const {
 }
 
 Expected<bool> Search::look_beside(const Swarm& swarm, Candidate& candidate) const {
-  const Settings& settings = problem_.kinds[candidate.kind].settings;
-  if (!settings.refine || problem_.shares_out() || problem_.part_searched || problem_.kinds.size() > 1) return false;
+  if (!problem_.settings.refine || problem_.shares_out() || problem_.part_searched || problem_.kinds.size() > 1) return false;
   for (const std::size_t particle : swarm.best_of_stretches()) {
     Candidate other;
     other.kind = candidate.kind;
     other.theta = swarm.own_bests()[particle];
     other.saving = candidate.saving;
     if (auto done = candidates_.refine(other); !done) return tl::unexpected(done.error());
-    const Support& support = other.support;
-    if (2 * support.beside > support.inliers()) continue;
-    if (!pays_among_others(support, settings, problem_.space(candidate.kind).minimal_sample())) continue;
+    if (2 * other.support.beside > other.support.inliers() || !candidates_.pays_among_others(other)) continue;
     candidate = std::move(other);
     return true;
   }

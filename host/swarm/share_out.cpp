@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "host/swarm/payment.hpp"
 #include "host/swarm/sampler.hpp"
 #include "host/swarm/swarm.hpp"
 #include "kernels/reused.hpp"
@@ -157,7 +156,7 @@ Expected<bool> ShareOut::pays_beside(std::size_t model, std::optional<std::size_
   candidate.theta = labelling_.models()[model];
   if (auto done = candidates_.look(candidate, 0); !done) return tl::unexpected(done.error());
   candidate.support.unexplained = problem_.points.finite_count();
-  return (together ? pays : pays_among_others)(candidate.support, problem_.settings, problem_.space(0).minimal_sample());
+  return together ? candidates_.pays(candidate) : candidates_.pays_among_others(candidate);
 }
 
 Expected<> ShareOut::describe(std::size_t of, std::span<const std::uint16_t> labels, Model& model) const {
