@@ -115,6 +115,29 @@ TEST(FitLines, WhatPaysIsFoundBesideWhatSavesMore) {
   }
 }
 
+TEST(FitLines, PointsStrewnEvenlyHaveNoModel) {
+  // Many are looked at, and some have an empty gap on either side.
+  constexpr unsigned kScenes = 100;
+  for (const ModelType model : {ModelType::line2d, ModelType::circle2d}) {
+    std::size_t invented = 0;
+    for (unsigned seed = 1; seed <= kScenes; ++seed) {
+      std::mt19937 rng(seed);
+      std::uniform_real_distribution<double> unit(0, 1);
+      std::vector<double> xy(2 * (60 + 10 * seed));
+      for (double& v : xy) v = unit(rng);
+      FitOptions options;
+      options.model = model;
+      options.seed = seed;
+      options.threshold = 0.0125;
+      options.backend = "cpu";
+      const auto result = fit(PointsView(std::span<const double>(xy), 2), options);
+      ASSERT_TRUE(result) << result.error().message;
+      invented += result->models.size();
+    }
+    EXPECT_LE(invented, 1U) << name(model) << "; two and three where only what surrounds a model was chance";
+  }
+}
+
 TEST(NoiseScale, CirclesAmongOutliersSeldomMisleadIt) {
   constexpr int kScenes = 100;
   int near = 0;
