@@ -121,7 +121,8 @@ kernels::Reused<std::size_t> Swarm::best_of_stretches() const {
     const auto stretch = std::span(own_fitness_).subspan(first, last - first);
     bests.push_back(first + static_cast<std::size_t>(std::min_element(stretch.begin(), stretch.end()) - stretch.begin()));
   }
-  std::stable_sort(bests.begin(), bests.end(), [&](std::size_t a, std::size_t b) { return own_fitness_[a] < own_fitness_[b]; });
+  std::sort(bests.begin(), bests.end(),
+            [&](std::size_t a, std::size_t b) { return std::pair(own_fitness_[a], a) < std::pair(own_fitness_[b], b); });
   return bests;
 }
 
