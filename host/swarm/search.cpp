@@ -48,7 +48,8 @@ Expected<bool> Search::look_beside(const Swarm& swarm, Candidate& candidate) con
 }
 
 Expected<Outcome> Search::explore(std::uint32_t round, std::span<const models::Position> seeds, Candidate& candidate) {
-  Swarm swarm(problem_.space(candidate.kind), settings_of(candidate.kind), problem_.random);
+  const Settings settings = settings_of(candidate.kind);
+  Swarm swarm(problem_.space(candidate.kind), settings, problem_.random);
   auto flown = pilot_.fly(swarm, candidate.kind, round, seeds, left_.caps(), kUnexplained * problem_.tau);
   if (!flown) return tl::unexpected(flown.error());
   if (!*flown) return Outcome::interrupted;

@@ -32,6 +32,7 @@ struct GlobalBest {
 class Swarm {
  public:
   Swarm(const models::ModelSpace& space, const Settings& settings, const Random& random);
+  Swarm(const models::ModelSpace& space, Settings&& settings, const Random& random) = delete;  // it looks into them as long as it lives
 
   /// From now on particles are placed and moved side by side on the evaluator's threads, where these are awake anyway for so many or a
   /// kind's samples take long. The same places come out.
