@@ -18,8 +18,9 @@ import sys
 import tempfile
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
+
+from ablation import misclassification
 
 SIZE = np.array([640.0, 480.0])
 FOCAL = 700.0
@@ -214,16 +215,6 @@ def figure(rng, name, sigma, outliers):
     return seen, rng.uniform(every.min(0) - 0.05, every.max(0) + 0.05, (strewn, 2))
 
 
-def wrong_labels(truth, found):
-    """Share of the points, outliers included, whose label is not that of their true model's match."""
-    right = np.sum((truth == 0) & (found == 0))
-    models, labels = np.unique(truth[truth > 0]), np.unique(found[found > 0])
-    if len(labels):
-        shared = np.array([[np.sum((truth == m) & (found == l)) for l in labels] for m in models])
-        right += shared[linear_sum_assignment(-shared)].sum()
-    return 1 - right / len(truth)
-
-
 def fit(binary, kind, path, seed, further):
     with tempfile.TemporaryDirectory() as folder:
         labels, result = pathlib.Path(folder, "labels.txt"), pathlib.Path(folder, "result.json")
@@ -282,7 +273,7 @@ def main():
                 sizes.append(len(rows))
                 for seed in range(1, args.seeds + 1):
                     labels, models, ms = fit(args.binary, kind, path, seed, further)
-                    wrong.append(wrong_labels(truth, labels))
+                    wrong.append(misclassification(truth, labels))
                     counts.append(models - len(seen))
                     times.append(ms)
             counts = np.array(counts)

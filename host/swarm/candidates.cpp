@@ -86,14 +86,15 @@ Expected<> Candidates::sink(const Candidate& candidate, std::vector<float>& caps
 bool Candidates::pays(const Candidate& candidate) const {
   const Settings& settings = problem_.kinds[candidate.kind].settings;
   const int sample = problem_.space(candidate.kind).minimal_sample();
-  if (swarm::pays(candidate.support, settings, sample, strewn(candidate))) return true;
+  const double by_chance = strewn(candidate);
+  if (swarm::pays(candidate.support, settings, sample, by_chance)) return true;
   // Few points in the plane, where all lines cross: there what others have taken decides.
   const bool crossed = problem_.points.dimension() == 2 && !problem_.part_searched && problem_.allowed.empty() && settings.refine &&
                        settings.deflation == Deflation::residual && !left_.near().beside.empty();
   if (!crossed) return false;
-  kernels::Reused<float> caps(problem_.points.size());
-  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = problem_.points.finite(i) ? problem_.tau : 0.0F;
-  return pays_across(candidate.support, count_support(candidate.distances, caps, problem_.tau), settings, sample, strewn(candidate));
+  kernels::Reused<float> caps;
+  cap_all(problem_.ground, caps);
+  return pays_across(candidate.support, count_support(candidate.distances, caps, problem_.tau), settings, sample, by_chance);
 }
 
 bool Candidates::pays_among_others(const Candidate& candidate) const {

@@ -38,6 +38,8 @@ class Candidates {
   Expected<> refine(Candidate& candidate) const;
   /// So many rounds of refinement on all points; distances, loss and support of what comes of it.
   Expected<> look(Candidate& candidate, int rounds) const;
+  /// Its support anew, by the caps as they are now; it stays where it is.
+  Expected<> recount(Candidate& candidate) const { return count(candidate, left_.caps(), left_.near()); }
   /// Does it pay for itself?
   bool pays(const Candidate& candidate) const;
   /// By what surrounds it alone?

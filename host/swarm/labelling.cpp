@@ -178,9 +178,9 @@ void Labelling::remove(State& state, std::size_t model) {
   }
 }
 
-Expected<bool> Labelling::adopt(State&& with) {
+Expected<bool> Labelling::adopt(State&& with, double hopeless) {
   label(with);
-  if (auto done = alternate(with); !done) return tl::unexpected(done.error());
+  if (auto done = alternate(with, hopeless); !done) return tl::unexpected(done.error());
   if (!(with.energy < state_.energy - kLeastFall)) return false;
   state_ = std::move(with);
   return true;
@@ -193,12 +193,9 @@ Expected<bool> Labelling::adopt_one_more(State&& with, double at_once, std::opti
   changed.push_back(0);
   label(with, changed);
   if (with.energy > state_.energy + at_once * prices_.model) return false;
-  label(with);
-  if (auto done = alternate(with, state_.energy + kHopeless * prices_.model); !done) return tl::unexpected(done.error());
-  if (!(with.energy < state_.energy - kLeastFall)) return false;
-  state_ = std::move(with);
-  kept_.push_back(kJoined);
-  return true;
+  auto adopted = adopt(std::move(with), state_.energy + kHopeless * prices_.model);
+  if (adopted && *adopted) kept_.push_back(kJoined);
+  return adopted;
 }
 
 Expected<bool> Labelling::drop_one() {
@@ -235,6 +232,12 @@ double Labelling::cost(std::size_t point) const {
   return label == 0 ? 1.0 : static_cast<double>(state_.distances[label - 1U][point] / ground_.tau);
 }
 
+kernels::Reused<float> Labelling::present_costs() const {
+  kernels::Reused<float> now(part_.index().size());
+  for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
+  return now;
+}
+
 void Labelling::costs(std::span<float> costs) const {
   std::fill(costs.begin(), costs.end(), 0.0F);
   for (std::size_t i = 0; i < part_.index().size(); ++i) {
@@ -254,8 +257,7 @@ Expected<bool> Labelling::try_one(models::Position proposal, kernels::Reused<flo
 }
 
 void Labelling::weigh_gains(std::span<const kernels::Reused<float>> distances, std::vector<double>& gains) const {
-  kernels::Reused<float> now(part_.index().size());
-  for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
+  const kernels::Reused<float> now = present_costs();
   for (std::size_t p = 0; p < gains.size(); ++p) {
     // What promises nothing now is not asked again.
     if (gains[p] < kPromising * prices_.model) continue;

@@ -104,11 +104,13 @@ class Labelling {
   /// Fits a proposal to what it wins of what the points cost as things stand; what it then saves, in units of tau.
   Expected<double> fit_to_gain(models::Position& theta, kernels::Reused<float>& distances) const;
   double cost(std::size_t point) const;
+  /// That of each point of the part [data unit].
+  kernels::Reused<float> present_costs() const;
   bool full() const noexcept { return most_ > 0 && state_.models.size() >= most_; }
   /// Labels and models in turn while the energy falls, or until it is found above `hopeless`.
   Expected<> alternate(State& state, double hopeless = std::numeric_limits<double>::infinity());
   /// The state becomes `with`, labelled and fitted, where that lowers the energy.
-  Expected<bool> adopt(State&& with);
+  Expected<bool> adopt(State&& with, double hopeless = std::numeric_limits<double>::infinity());
   /// The same with a model more, the last, made out of nothing or of `parent`. Given up, before anything is fitted, where with the labels
   /// that it changes directly the energy is above the present one by `at_once` prices of a model.
   Expected<bool> adopt_one_more(State&& with, double at_once, std::optional<std::size_t> parent = std::nullopt);

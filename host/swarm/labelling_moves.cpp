@@ -97,8 +97,7 @@ void Labelling::fit_to(Takes&& takes, models::Position& theta) const {
 }
 
 Expected<double> Labelling::fit_to_gain(models::Position& theta, kernels::Reused<float>& distances) const {
-  kernels::Reused<float> now(part_.index().size());
-  for (std::size_t i = 0; i < now.size(); ++i) now[i] = static_cast<float>(cost(i)) * ground_.tau;
+  const kernels::Reused<float> now = present_costs();
   double gain = saved(now, distances);
   for (int fit = 0; fit < kFits; ++fit) {
     models::Position next = theta;

@@ -84,7 +84,7 @@ Expected<> MultiModel::take_planes_that_stand_out(const Seeds& seeds, const Mode
 
 Expected<> MultiModel::look_round_by_round(const Seeds& seeds, const ModelCallback& on_model, FitResult& result) {
   static constexpr const char* kNothingPays = "complete: no further model pays for itself";
-  int unpaid = 0, most_unpaid = 0;
+  int unpaid = 0;
   double saving = 0;
   search_.end_soon(problem_.settings.eager_stall > 0 && !problem_.part_searched);
   while (pilot_.why_ended().empty()) {
@@ -97,7 +97,6 @@ Expected<> MultiModel::look_round_by_round(const Seeds& seeds, const ModelCallba
       break;
     }
     Candidate best;
-    search_.look_harder(most_unpaid);
     auto outcome = search(seeds, best);
     if (!outcome) return tl::unexpected(outcome.error());
     if (*outcome == Outcome::interrupted) {
@@ -125,7 +124,7 @@ Expected<> MultiModel::look_round_by_round(const Seeds& seeds, const ModelCallba
     } else if (++unpaid >= problem_.settings.patience || (unpaid > 1 && agree(best.saving, saving))) {
       pilot_.end(kNothingPays);
     }
-    most_unpaid = std::max(most_unpaid, unpaid);
+    search_.look_harder(unpaid);
     saving = best.saving;
   }
   return {};

@@ -9,6 +9,7 @@
 #include "host/swarm/multi_model.hpp"
 #include "host/swarm/noise_model.hpp"
 #include "host/swarm/payment.hpp"
+#include "host/swarm/problem.hpp"
 #include "host/swarm/refinement.hpp"
 #include "kernels/reused.hpp"
 
@@ -103,7 +104,7 @@ class Estimate {
         distances_(input.points.size()),
         nearest_(input.points.size()),
         caps_(input.points.size()),
-        width_(std::sqrt(12.0 / input.points.dimension()) * input.points.frame().scale) {
+        width_(even_side(input.points.dimension()) * input.points.frame().scale) {
     std::erase_if(kinds_, [](const Kind& kind) { return kind.hidden; });  // a line taken for a wide circle has its noise all the same
   }
 
@@ -113,7 +114,7 @@ class Estimate {
     double most = 0;
     int starts = 0;
     for (double start = best.threshold; starts < kStarts && rounds_ < kRounds; start /= 2) {
-      auto settled = settle(start);
+      auto settled = settle(start, starts > 0 ? most_models() : kFirstModels);
       if (!settled) return settled;
       if (settled->models.empty()) {  // so wide that nothing stands out from what surrounds it
         if (best.models.empty()) best.threshold = settled->threshold;
@@ -133,19 +134,19 @@ class Estimate {
       // must stand against then.
       if (narrowed) break;
       ++starts;
-      in_doubt_ = true;
     }
     return best;
   }
 
  private:
   /// From one threshold on; no models where the first search finds none.
-  Expected<NoiseScale> settle(double tau) {
+  /// The first looks for `at_first` models.
+  Expected<NoiseScale> settle(double tau, std::size_t at_first) {
     NoiseScale now{tau, {}};
     bool widened = false;
     while (rounds_ < kRounds) {
       FitResult result;
-      auto found = search(now.threshold, now.models.empty() && !in_doubt_ ? kFirstModels : most_models(), result);
+      auto found = search(now.threshold, now.models.empty() ? at_first : most_models(), result);
       if (!found) return tl::unexpected(found.error());
       if (found->empty()) {
         if (now.models.empty()) {
@@ -192,7 +193,7 @@ class Estimate {
       const kernels::Reused<float> allowed = allowed_by(in_.spread, static_cast<float>(tau));
       const Ground ground = ground_at(tau, allowed);
       if (step > 0) {
-        cap(ground);
+        cap_all(ground, caps_);
         for (auto& [space, theta] : found) {
           if (auto done = refine_one(ground.of(*space), settings.loss, caps_, theta); !done) return tl::unexpected(done.error());
         }
@@ -214,7 +215,7 @@ class Estimate {
     const auto tau = static_cast<float>(scale.threshold);
     const kernels::Reused<float> allowed = allowed_by(in_.spread, tau);
     const Ground ground = ground_at(scale.threshold, allowed);
-    cap(ground);
+    cap_all(ground, caps_);
     kernels::Reused<float> caps = caps_;
     for (std::size_t i = 0; i < caps.size(); ++i) caps[i] *= tau / ground.allowed_at(i);
     double evenly = 0, wide = 0;
@@ -246,16 +247,11 @@ class Estimate {
             .allowed = allowed};
   }
 
-  void cap(const Ground& ground) {
-    for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] = in_.points.finite(i) ? ground.allowed_at(i) : 0.0F;
-  }
-
   Input in_;
   std::vector<Kind> kinds_;
   kernels::Reused<float> distances_, nearest_, caps_;
-  double width_;           // of the cloud, were its points strewn evenly [data unit]
-  int rounds_ = 0;         // of search, so far
-  bool in_doubt_ = false;  // whether a threshold has been found that may be too wide
+  double width_;    // of the cloud, were its points strewn evenly [data unit]
+  int rounds_ = 0;  // of search, so far
 };
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "host/swarm/problem.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "host/swarm/noise_model.hpp"
@@ -50,7 +49,7 @@ double Problem::strewn_along(std::size_t kind, const models::Position& theta) co
   if (points.dimension() != 2 || !allowed.empty() || !(box.area() > 0)) return 0;
   const double slab = 2 * static_cast<double>(tau) / points.frame().scale;  // [working frame]
   // A line crosses a square as spread as they are once; of a curve what lies in the box counts.
-  const double across = std::sqrt(12.0 / points.dimension()), within = space(kind).length_within(theta, box.low, box.high);
+  const double across = even_side(points.dimension()), within = space(kind).length_within(theta, box.low, box.high);
   return std::min(1.0, space(kind).closed_form() ? slab / across : slab * within / box.area());
 }
 

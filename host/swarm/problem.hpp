@@ -2,6 +2,7 @@
 // normals may be learnt once, before the first swarm that asks for them.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -22,6 +23,9 @@ namespace swarmfit::swarm {
 
 /// With more points, what is gained by looking closer is nothing beside what they say together.
 inline constexpr std::size_t kFewPoints = 2048;
+
+/// Side of the square or cube over which points strewn evenly are as spread as those of a cloud are [working frame].
+inline double even_side(int dimension) { return std::sqrt(12.0 / dimension); }
 
 /// What lies between two corners of the plane.
 struct Box {

@@ -48,6 +48,11 @@ void ModelRows::add(const models::ModelSpace& space, const models::Position& the
   views_.push_back({space.kind(), std::span<const double>(row.data(), static_cast<std::size_t>(row.size()))});
 }
 
+void cap_all(const Ground& ground, std::vector<float>& caps) {
+  caps.resize(ground.points.size());
+  for (std::size_t i = 0; i < caps.size(); ++i) caps[i] = ground.points.finite(i) ? ground.allowed_at(i) : 0.0F;
+}
+
 void forget_beyond(std::size_t last, std::span<std::uint16_t> labels) noexcept {
   std::replace_if(
       labels.begin(), labels.end(), [&](std::uint16_t label) { return label > last; }, std::uint16_t{0});

@@ -44,6 +44,9 @@ struct Ground {
   std::uint32_t index(std::size_t k) const noexcept { return part != nullptr ? part->index()[k] : static_cast<std::uint32_t>(k); }
 };
 
+/// The caps of points that nothing explains: what each may be off, 0 where it is not finite. One for each of the cloud.
+void cap_all(const Ground& ground, std::vector<float>& caps);
+
 /// Of refinement, where there is no cause for fewer.
 inline constexpr int kMostRounds = 8;
 

@@ -1,6 +1,7 @@
 // One search: a swarm of one kind over what is left to explain, and what it comes to.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,8 +26,8 @@ class Search {
   /// Swarms of kinds that say so end soon, until told otherwise.
   void end_soon(bool soon) noexcept { soon_ = soon; }
   bool ends_soon() const noexcept { return soon_; }
-  /// After so many swarms that found nothing the next begin with more samples: what is left is hit by fewer of them.
-  void look_harder(int times) noexcept { vain_ = times; }
+  /// After so many swarms in a row that found nothing all later ones begin with more samples: what is left is hit by fewer of them.
+  void look_harder(int times) noexcept { vain_ = std::max(vain_, times); }
   /// Where the joint end chooses from them: what particles of all swarms knew.
   const std::vector<models::Position>& proposals() const noexcept { return proposals_; }
 
@@ -42,7 +43,7 @@ class Search {
   const Candidates& candidates_;
   Worth worth_;
   bool soon_ = false;
-  int vain_ = 0;
+  int vain_ = 0;  // most swarms in a row that found nothing
   std::vector<models::Position> proposals_;
 };
 

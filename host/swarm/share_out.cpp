@@ -137,24 +137,27 @@ Expected<bool> ShareOut::any_pays(bool any_found) {
   // models explain most of what is strewn, and each would then lie alone.
   const std::size_t count = labelling_.models().size();
   for (std::size_t model = 0; model < count; ++model) {
+    Candidate candidate;
+    candidate.theta = labelling_.models()[model];
+    left_.restore();
+    if (auto done = candidates_.look(candidate, 0); !done) return tl::unexpected(done.error());
     for (std::size_t aside = 0; aside < count; ++aside) {
-      auto paid = pays_beside(model, aside == model ? std::nullopt : std::optional(aside), together);
+      auto paid = pays_beside(candidate, aside == model ? std::nullopt : std::optional(aside), together);
       if (!paid || *paid) return paid;
     }
   }
   return false;
 }
 
-Expected<bool> ShareOut::pays_beside(std::size_t model, std::optional<std::size_t> aside, bool together) {
+Expected<bool> ShareOut::pays_beside(Candidate& candidate, std::optional<std::size_t> aside, bool together) {
   left_.restore();
   if (aside) {
     kernels::Reused<float> theirs(problem_.points.size(), 0.0F);
     labelling_.mark_owned(*aside, theirs);
     for (std::size_t i = 0; i < theirs.size(); ++i) left_.caps()[i] *= 1 - theirs[i];
   }
-  Candidate candidate;
-  candidate.theta = labelling_.models()[model];
-  if (auto done = candidates_.look(candidate, 0); !done) return tl::unexpected(done.error());
+  if (auto done = candidates_.recount(candidate); !done) return tl::unexpected(done.error());
+  // What is set aside surrounds nothing, but chance had it to choose from.
   candidate.support.unexplained = problem_.points.finite_count();
   return together ? candidates_.pays(candidate) : candidates_.pays_among_others(candidate);
 }

@@ -40,8 +40,8 @@ class ShareOut {
   Expected<> search_further();
   /// Does one of the models pay for itself, beside no other? `any_found`: one of the first search did.
   Expected<bool> any_pays(bool any_found);
-  /// Does one, where the points of another are set aside? `together`: points lie together as those of bodies do.
-  Expected<bool> pays_beside(std::size_t model, std::optional<std::size_t> aside, bool together);
+  /// Does this one, which has been looked at, where the points of a model are set aside? `together`: points lie together as those of bodies do.
+  Expected<bool> pays_beside(Candidate& candidate, std::optional<std::size_t> aside, bool together);
   /// Models are replaced, split and joined by samples of their own points while that lowers the joint energy.
   Expected<> regroup();
   /// One round of it; true if anything has changed.

@@ -4,10 +4,7 @@
 
 namespace swarmfit::swarm {
 
-void Unexplained::restore() {
-  caps_.resize(problem_.points.size());
-  for (std::size_t i = 0; i < caps_.size(); ++i) caps_[i] = problem_.points.finite(i) ? problem_.ground.allowed_at(i) : 0.0F;
-}
+void Unexplained::restore() { cap_all(problem_.ground, caps_); }
 
 Expected<> Unexplained::show(std::span<const float> caps) {
   problem_.part.gather(caps, part_caps_);
