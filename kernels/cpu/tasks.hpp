@@ -28,6 +28,12 @@ inline Crew*& current_crew() noexcept {
   return current;
 }
 
+/// Nobody but who calls. It keeps nothing, so that any number of threads may be it.
+inline Crew& nobody_else() {
+  static Crew alone(1);
+  return alone;
+}
+
 /// Threads that tasks are shared out to where this is called.
 inline std::size_t workers() noexcept { return current_crew() != nullptr ? static_cast<std::size_t>(current_crew()->threads()) : 1; }
 
@@ -63,7 +69,7 @@ void for_each_task(std::size_t tasks, Body&& body) {
   }
 }
 
-/// Work whose tasks are shared out to the crew, or else done by the caller.
+/// Work whose tasks are shared out to the crew, or else done by the caller alone, whatever the work is a part of.
 template <class Work>
 void run_in(Crew& crew, bool shared, Work&& work) {
   struct Within {
@@ -71,8 +77,7 @@ void run_in(Crew& crew, bool shared, Work&& work) {
     ~Within() { current_crew() = before; }
     Crew* before;
   };
-  if (!shared) return work();
-  const Within within(&crew);
+  const Within within(shared ? &crew : &nobody_else());
   work();
 }
 
