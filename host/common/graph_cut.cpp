@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <numeric>
 #include <utility>
 
@@ -56,6 +57,8 @@ std::vector<PottsEnergy::Label> PottsEnergy::cheapest() const {
 
 void PottsEnergy::close() {
   role_.assign(nodes(), Role::fixed);
+  borders_.resize(nodes());
+  take_.resize(nodes());
   if (pieces_.empty()) {
     make_graph();
     find_pieces();
@@ -110,15 +113,16 @@ void PottsEnergy::find_pieces() {
 
 void PottsEnergy::find_takers(Piece& piece) {
   piece.takers.clear();
-  const auto of_label = [&](Label label) {
-    return std::find_if(piece.takers.begin(), piece.takers.end(), [&](const Takers& t) { return t.label == label; });
-  };
   // Counted first, then laid out label by label.
   for (const std::int32_t i : piece.nodes)
     for (const Choice& choice : choices(static_cast<std::size_t>(i))) {
-      auto found = of_label(choice.label);
-      if (found == piece.takers.end()) found = piece.takers.insert(found, {choice.label, 0, 0, true});
-      ++found->last;
+      if (choice.label >= place_.size()) place_.resize(choice.label + std::size_t{1}, kNowhere);
+      std::size_t& place = place_[choice.label];
+      if (place == kNowhere) {
+        place = piece.takers.size();
+        piece.takers.push_back({choice.label, 0, 0, true});
+      }
+      ++piece.takers[place].last;
     }
   std::size_t first = takers_.size();
   for (Takers& t : piece.takers) {
@@ -128,44 +132,40 @@ void PottsEnergy::find_takers(Piece& piece) {
   }
   takers_.resize(first);
   for (const std::int32_t i : piece.nodes)
-    for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[of_label(choice.label)->last++] = {i, choice.cost};
+    for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[piece.takers[place_[choice.label]].last++] = {i, choice.cost};
+  for (const Takers& t : piece.takers) place_[t.label] = kNowhere;
 }
 
 /// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. What a pair (i, j), i < j, costs at (x_i, x_j) is split into a part
 /// of x_i alone, V(1,0) - V(0,0), a part of x_j alone, -V(1,0), and the rest V(0,1) + V(1,0) - V(0,0) at (0, 1) (Kolmogorov and Zabih
-/// 2004).
-void PottsEnergy::set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take,
-                                 std::span<const Label> labels) {
-  for (std::size_t k = 0; k < part.size(); ++k) {
-    const std::int32_t i = part[k];
-    const Label own = labels[static_cast<std::size_t>(i)];
-    std::int32_t gain = (take[k] - find(static_cast<std::size_t>(i), own)->cost);  // of keeping over taking
-    for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a) {
-      const auto [head, mate] = graph_.arc(a);
-      const auto j = static_cast<std::size_t>(head);
-      const std::int32_t weight = weight_[static_cast<std::size_t>(a)];
-      if (role_[j] == Role::fixed) {
-        gain += apart(weight, alpha, labels[j]) - apart(weight, own, labels[j]);
-        graph_.capacity(a) = graph_.capacity(mate) = 0;
-      } else {
-        const std::int32_t kept = apart(weight, own, labels[j]), i_takes = apart(weight, alpha, labels[j]),
-                           j_takes = apart(weight, own, alpha);
-        gain += i < head ? i_takes - kept : -j_takes;
-        graph_.capacity(a) = i < head ? i_takes + j_takes - kept : 0;
-      }
+/// 2004). Two of the same label ask for the same at (0, 1) and at (1, 0), and for nothing alone.
+void PottsEnergy::set_capacities(std::int32_t i, Label alpha, std::int32_t take, std::span<const Label> labels) {
+  const Label own = labels[static_cast<std::size_t>(i)];
+  std::int32_t gain = take - find(static_cast<std::size_t>(i), own)->cost;  // of keeping over taking
+  for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a) {
+    const auto [head, mate] = graph_.arc(a);
+    const auto j = static_cast<std::size_t>(head);
+    const std::int32_t weight = weight_[static_cast<std::size_t>(a)], i_takes = apart(weight, alpha, labels[j]);
+    if (role_[j] == Role::fixed) {
+      gain += i_takes - apart(weight, own, labels[j]);
+      graph_.capacity(a) = graph_.capacity(mate) = 0;
+    } else if (own == labels[j]) {
+      graph_.capacity(a) = i_takes;
+    } else {
+      const std::int32_t kept = apart(weight, own, labels[j]), j_takes = apart(weight, own, alpha);
+      gain += i < head ? i_takes - kept : -j_takes;
+      graph_.capacity(a) = i < head ? i_takes + j_takes - kept : 0;
     }
-    graph_.terminal(i) = gain;
   }
+  graph_.terminal(i) = gain;
 }
 
-PottsEnergy::Cost PottsEnergy::fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take,
-                                       std::span<const Label> labels) const {
+PottsEnergy::Cost PottsEnergy::fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const Label> labels) const {
   Cost fall = 0;
-  for (std::size_t k = 0; k < part.size(); ++k) {
-    const std::int32_t i = part[k];
+  for (const std::int32_t i : part) {
     if (role_[static_cast<std::size_t>(i)] != Role::takes) continue;
     const Label own = labels[static_cast<std::size_t>(i)];
-    fall += find(static_cast<std::size_t>(i), own)->cost - take[k];
+    fall += find(static_cast<std::size_t>(i), own)->cost - take_[static_cast<std::size_t>(i)];
     for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a) {
       const std::int32_t j = graph_.arc(a).head;
       const Label other = labels[static_cast<std::size_t>(j)];
@@ -189,27 +189,53 @@ void PottsEnergy::make_stale(Piece& piece, std::size_t node, Label alpha) const 
     mark(static_cast<std::size_t>(graph_.arc(a).head));
 }
 
+void PottsEnergy::count_borders(const Piece& piece, std::span<const Label> labels) {
+  for (const std::int32_t i : piece.nodes) {
+    std::int32_t& count = borders_[static_cast<std::size_t>(i)] = 0;
+    for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a)
+      count += labels[static_cast<std::size_t>(graph_.arc(a).head)] != labels[static_cast<std::size_t>(i)] ? 1 : 0;
+  }
+}
+
+void PottsEnergy::relabel(std::int32_t i, Label alpha, std::vector<Label>& labels) {
+  const Label before = std::exchange(labels[static_cast<std::size_t>(i)], alpha);
+  for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a) {
+    const auto j = static_cast<std::size_t>(graph_.arc(a).head);
+    const std::int32_t more = (labels[j] != alpha ? 1 : 0) - (labels[j] != before ? 1 : 0);
+    borders_[j] += more;
+    borders_[static_cast<std::size_t>(i)] += more;
+  }
+}
+
 PottsEnergy::Cost PottsEnergy::expand(Piece& piece, const Takers& takers, std::vector<Label>& labels) {
   const Label alpha = takers.label;
-  kernels::Reused<std::int32_t> part, take;
+  kernels::Reused<std::int32_t> part;
   part.reserve(takers.last - takers.first);
-  take.reserve(takers.last - takers.first);
   for (std::size_t t = takers.first; t < takers.last; ++t) {
     const auto i = static_cast<std::size_t>(takers_[t].node);
     if (labels[i] == alpha) continue;
     role_[i] = Role::may_take;
+    take_[i] = takers_[t].cost;
     part.push_back(takers_[t].node);
-    take.push_back(takers_[t].cost);
   }
-  set_capacities(part, alpha, take, labels);
-  graph_.cut(part);
+  const auto prepare = [&](std::int32_t i) { set_capacities(i, alpha, take_[static_cast<std::size_t>(i)], labels); };
+  for (const std::int32_t node : part) {
+    // Among its like a node only loses by taking what is dearer.
+    const auto i = static_cast<std::size_t>(node);
+    if (borders_[i] == 0 && take_[i] >= find(i, labels[i])->cost) {
+      graph_.put_off(node);
+    } else {
+      prepare(node);
+    }
+  }
+  graph_.cut(part, std::cref(prepare));  // a reference fits where a function is kept
   for (const std::int32_t i : part)
     if (graph_.at_sink(i)) role_[static_cast<std::size_t>(i)] = Role::takes;
-  const Cost fall = fall_of(part, alpha, take, labels);
+  const Cost fall = fall_of(part, alpha, labels);
   for (const std::int32_t node : part) {
     const auto i = static_cast<std::size_t>(node);
     if (role_[i] == Role::takes && fall > 0) {
-      labels[i] = alpha;
+      relabel(node, alpha, labels);
       make_stale(piece, i, alpha);
     }
     role_[i] = Role::fixed;
@@ -219,9 +245,11 @@ PottsEnergy::Cost PottsEnergy::expand(Piece& piece, const Takers& takers, std::v
 
 PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) {
   Cost fall = 0;
-  for (Piece& piece : pieces_)
+  for (Piece& piece : pieces_) {
+    count_borders(piece, labels);
     for (const Takers& takers : piece.takers)
       if (takers.label == alpha) fall += expand(piece, takers, labels);
+  }
   return fall;
 }
 
@@ -231,6 +259,7 @@ PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles
     for (int k = first; k < last; ++k) {
       Piece& piece = pieces_[static_cast<std::size_t>(k)];
       for (Takers& takers : piece.takers) takers.stale = true;
+      count_borders(piece, labels);
       bool still = false;
       for (int cycle = 0; cycle < cycles && !still; ++cycle) {
         still = true;

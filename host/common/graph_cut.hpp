@@ -71,6 +71,7 @@ class PottsEnergy {
     std::vector<std::int32_t> nodes;
     std::vector<Takers> takers;
   };
+  static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
   enum class Role : std::uint8_t { fixed, may_take, takes };
 
   /// What a pair of labels costs at an edge of some weight.
@@ -84,9 +85,12 @@ class PottsEnergy {
   void find_pieces();
   void find_takers(Piece& piece);
   Cost expand(Piece& piece, const Takers& takers, std::vector<Label>& labels);
-  void set_capacities(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take, std::span<const Label> labels);
-  Cost fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const std::int32_t> take, std::span<const Label> labels) const;
+  /// Of a node that may take alpha at a cost of `take`.
+  void set_capacities(std::int32_t node, Label alpha, std::int32_t take, std::span<const Label> labels);
+  Cost fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const Label> labels) const;
   void make_stale(Piece& piece, std::size_t node, Label alpha) const;
+  void count_borders(const Piece& piece, std::span<const Label> labels);
+  void relabel(std::int32_t node, Label alpha, std::vector<Label>& labels);
 
   std::vector<std::size_t> first_;  // of each node's choices
   std::vector<Choice> choices_;
@@ -97,7 +101,10 @@ class PottsEnergy {
   std::vector<std::int32_t> weight_;  // one an arc
   std::vector<Piece> pieces_;         // those with most nodes first
   std::vector<Taker> takers_;
-  std::vector<Role> role_;  // one a node, within an expansion
+  std::vector<std::size_t> place_;     // of a label among a piece's takers, while these are found
+  std::vector<Role> role_;             // one a node, within an expansion
+  std::vector<std::int32_t> borders_;  // of each node, how many of its neighbours have another label, while labels change
+  std::vector<std::int32_t> take_;     // of each node, what it costs to take the label of an expansion
 };
 
 }  // namespace swarmfit::common

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,18 +25,20 @@ class CutGraph {
   std::int32_t last_arc(std::int32_t node) const noexcept { return first_[static_cast<std::size_t>(node) + 1]; }
   const Arc& arc(std::int32_t a) const noexcept { return arcs_[static_cast<std::size_t>(a)]; }
 
-  /// To be set before each cut, for all its nodes and all arcs at them: an arc that leaves the part has capacity 0, and so has its mate.
-  /// Below 2^30.
+  // To be set before each cut, for all its nodes and all arcs at them, or on the way; below 2^30.
+  /// An arc that leaves the part has none, and neither has its mate.
   std::int32_t& capacity(std::int32_t a) noexcept { return capacity_[static_cast<std::size_t>(a)]; }
   /// From the source where > 0, to the sink where < 0.
   std::int32_t& terminal(std::int32_t node) noexcept { return nodes_[static_cast<std::size_t>(node)].terminal; }
 
+  /// The terminal of a node and the capacities at it are not set for the next cut: prepare(node) will, if they are asked for. The terminal
+  /// is not the sink's.
+  void put_off(std::int32_t node) noexcept { nodes_[static_cast<std::size_t>(node)].put_off = true; }
+
+  using Prepare = std::function<void(std::int32_t)>;
   /// Finds a minimum cut between the nodes of `part`, the one with the fewest nodes on the sink's side.
-  void cut(std::span<const std::int32_t> part);
-  bool at_sink(std::int32_t node) const noexcept {
-    const Node& n = nodes_[static_cast<std::size_t>(node)];
-    return n.parent != kFree && n.sink;
-  }
+  void cut(std::span<const std::int32_t> part, const Prepare& prepare = {});
+  bool at_sink(std::int32_t node) const noexcept { return nodes_[static_cast<std::size_t>(node)].parent != kFree; }
 
  private:
   friend class CutSearch;
@@ -45,8 +48,8 @@ class CutGraph {
     std::int32_t parent = kFree;  // the arc towards it
     std::int32_t next = -1;       // in the list of active nodes; itself where it is the last
     std::int32_t stamp = 0;       // when `distance` was true
-    std::int32_t distance = 0;    // to the terminal, in arcs
-    bool sink = false;            // whose tree it belongs to
+    std::int32_t distance = 0;    // to the sink, in arcs
+    bool put_off = false;
   };
 
   std::vector<std::int32_t> first_;
