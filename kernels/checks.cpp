@@ -102,6 +102,7 @@ Result<> check_weigh(const PointsView& points, const Weighing& how, std::span<co
   if (!distances.empty()) {
     if (auto size = check_size("distances.size()", distances.size(), models.size() * points.count); !size) return size;
   }
+  if (evidence.empty() && !distances.empty()) return {};  // nobody asks for more
   return check_size("evidence.size()", evidence.size(), models.size());
 }
 

@@ -94,15 +94,16 @@ void weigh_points(const PointsView& points, const Weighing& how, std::span<const
   const std::vector<Residual> residual = residuals(models, centre.data());
   const auto tolerance = static_cast<double>(how.tolerance);
   for (std::size_t m = 0; m < models.size(); ++m) {
-    evidence[m] = {};
+    Evidence unasked, &told = evidence.empty() ? unasked : evidence[m];
+    told = {};
     for (std::size_t i = 0; i < points.count; ++i) {
       const bool finite = points.finite(i);
       const double d = finite ? residual[m](points, i) : std::numeric_limits<double>::quiet_NaN();
       if (!distances.empty()) distances[m * points.count + i] = static_cast<float>(d);
       if (!finite) continue;
       const double limit = how.caps.empty() ? tolerance : static_cast<double>(how.caps[i]);
-      evidence[m].cost += std::min(d, limit);
-      if (d <= tolerance && d <= limit) speak(points, i, d, 1 / std::max(d / tolerance, static_cast<double>(how.corner)), evidence[m]);
+      told.cost += std::min(d, limit);
+      if (d <= tolerance && d <= limit) speak(points, i, d, 1 / std::max(d / tolerance, static_cast<double>(how.corner)), told);
     }
   }
 }

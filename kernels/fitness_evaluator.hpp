@@ -102,7 +102,8 @@ class FitnessEvaluator {
   virtual Result<> survey(const PointsView& points, Survey& survey);
 
   /// What the points within the tolerance of each model say of it. `distances` is empty, or gets |dist| of every point to the first model,
-  /// then to the second, and so on; NaN for points that are not finite. A model with a non-finite parameter has no point.
+  /// then to the second, and so on; NaN for points that are not finite. `evidence` is one a model, or empty where distances are all that is
+  /// asked. A model with a non-finite parameter has no point.
   virtual Result<> weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                          std::span<Evidence> evidence);
 

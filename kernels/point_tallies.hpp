@@ -46,4 +46,18 @@ struct Sinking {
 void sink(std::span<const float> distances, const Sinking& how, std::span<std::uint8_t> marks, std::span<float> others,
           std::span<float> caps);
 
+/// Sum of what the distances are less than the caps; NaN is not less.
+double saved(std::span<const float> caps, std::span<const float> distances);
+
+/// How distances come to count by their logarithm, so that small ones tell more than large ones.
+struct Bending {
+  float unit = 0;      ///< what stays itself, > 0 [unit of the distances]
+  float bend = 0;      ///< of the unit, > 0: d becomes unit log(1 + d / (bend unit)) / log(1 + 1 / bend)
+  float farthest = 0;  ///< of the unit: what is farther away
+  float beyond = 0;    ///< counts so much, of the unit
+};
+
+/// In place; NaN stays.
+void bend(std::span<float> distances, const Bending& how);
+
 }  // namespace swarmfit::kernels

@@ -135,6 +135,28 @@ TEST_P(Passes, WeighedAlikeOnAllSizes) {
   }
 }
 
+TEST_P(Passes, DistancesAreTheSameWhereNobodyAsksForMore) {
+  for (const ModelKind kind : {ModelKind::plane, ModelKind::homography}) {
+    Cloud cloud = make_cloud(kind, 3000);
+    for (std::size_t i = 0; i < cloud.narrow.size(); i += 97) cloud.narrow[i] = i % 2 == 0 ? kNaN : -kInf;
+    std::vector<double> swarm = make_swarm(kind, 3);
+    swarm[static_cast<std::size_t>(traits(kind).parameter_count)] = std::numeric_limits<double>::quiet_NaN();
+    const auto models = views(kind, swarm);
+    const Weighing how{0.02F, 1, {}};
+    std::vector<float> with_more(3 * cloud.count()), alone(3 * cloud.count());
+    std::vector<Evidence> more(3);
+    ASSERT_OK(evaluator().weigh(cloud.view(), how, models, with_more, more));
+    ASSERT_OK(evaluator().weigh(cloud.view(), how, models, alone, {}));
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      EXPECT_TRUE(alone[i] == with_more[i] || (std::isnan(alone[i]) && std::isnan(with_more[i]))) << traits(kind).name << ' ' << i;
+    }
+  }
+  const Cloud cloud = make_cloud(ModelKind::plane, 100);
+  const std::vector<double> plane = make_swarm(ModelKind::plane, 1);
+  EXPECT_TRUE(
+      is_invalid(evaluator().weigh(cloud.view(), {0.02F, 1, {}}, views(ModelKind::plane, plane), {}, {}), {"evidence.size()", "0", "1"}));
+}
+
 TEST_P(Passes, WeighedAlikeFarFromTheOriginAndInAnyLayout) {
   const Cloud far = make_cloud(ModelKind::plane, 3000, 5e6, 2, false);
   const std::vector<double> far_plane = make_swarm(ModelKind::plane, 1, 5e6);

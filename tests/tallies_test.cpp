@@ -118,6 +118,33 @@ TEST_P(Tallies, WhatAFoundModelLeavesIsThatOfAPlainLoop) {
   }
 }
 
+TEST_P(Tallies, WhatIsSavedIsThatOfAPlainLoop) {
+  for (const std::size_t n : {0, 1, 3, 15, 16, 17, 5003}) {
+    const Values v = make_values(n);
+    double exact = 0;
+    for (std::size_t i = 0; i < n; ++i) exact += v.distances[i] < v.caps[i] ? static_cast<double>(v.caps[i] - v.distances[i]) : 0.0;
+    EXPECT_NEAR(GetParam()->saved(v.caps, v.distances), exact, 1e-12 * exact) << n;
+  }
+}
+
+TEST_P(Tallies, BentDistancesAreThoseOfAPlainLoop) {
+  const Bending how{.unit = 2 * kWidth, .bend = 0.8F, .farthest = 3, .beyond = 5};
+  for (const std::size_t n : {0, 1, 3, 15, 16, 17, 5003}) {
+    const Values v = make_values(n);
+    std::vector<float> found = v.distances;
+    GetParam()->bend(found, how);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double d = static_cast<double>(v.distances[i]), unit = static_cast<double>(how.unit), bend = static_cast<double>(how.bend);
+      if (std::isnan(d)) {
+        EXPECT_TRUE(std::isnan(found[i]));
+      } else {
+        const double exact = d > 3 * unit ? 5 * unit : unit * std::log1p(d / (bend * unit)) / std::log1p(1 / bend);
+        EXPECT_NEAR(static_cast<double>(found[i]), exact, 1e-6 * unit) << i << " of " << n << ", " << d;
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(OnEach, Tallies, testing::ValuesIn(cpu::available_tally_kernels()),
                          [](const auto& one) { return std::string(one.param->name); });
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "host/swarm/payment.hpp"
+#include "kernels/point_tallies.hpp"
 #include "kernels/reused.hpp"
 
 namespace swarmfit::swarm {
@@ -55,13 +56,6 @@ Labelling::Labelling(const Ground& ground, const Subset& part, const models::Nei
   }
 }
 
-float Labelling::bent(float distance) const {
-  if (!(prices_.bend > 0)) return distance;
-  const float bend = static_cast<float>(prices_.bend), far = distance / ground_.tau;
-  if (far > farthest_) return kBeyond * ground_.tau;
-  return ground_.tau * std::log1p(far / bend) / per_bend_;
-}
-
 float Labelling::unbent(float cost) const {
   if (!(prices_.bend > 0)) return cost;
   const float bend = static_cast<float>(prices_.bend);
@@ -73,11 +67,10 @@ Expected<kernels::Reused<kernels::Reused<float>>> Labelling::measure(std::span<c
   for (const models::Position& theta : models) rows.add(ground_.space, theta);
   const std::size_t points = part_.index().size();
   kernels::Reused<float> all(points * models.size());
-  kernels::Reused<kernels::Evidence> evidence(models.size());
-  if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), all, evidence); !done) {
+  if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), all, {}); !done) {
     return tl::unexpected(to_error(done.error()));
   }
-  for (float& one : all) one = bent(one);
+  if (prices_.bend > 0) kernels::bend(all, {ground_.tau, static_cast<float>(prices_.bend), farthest_, kBeyond});
   kernels::Reused<kernels::Reused<float>> distances(models.size());
   for (std::size_t m = 0; m < models.size(); ++m) {
     distances[m].assign(all.begin() + static_cast<std::ptrdiff_t>(m * points), all.begin() + static_cast<std::ptrdiff_t>((m + 1) * points));

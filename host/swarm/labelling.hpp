@@ -92,8 +92,7 @@ class Labelling {
 
   /// Of each model to each point of the part, bent.
   Expected<kernels::Reused<kernels::Reused<float>>> measure(std::span<const models::Position> models) const;
-  /// What a distance counts as, so that tau stays tau: small ones tell models apart, and large ones hardly. And back [data unit].
-  float bent(float distance) const;
+  /// Of what a distance counts as, where they are bent, the distance [data unit].
   float unbent(float cost) const;
   /// The labels of the state's models, from those it has where they may stay; and the energy. `only`: not empty where no other labels may
   /// be taken.

@@ -8,12 +8,6 @@
 
 namespace swarmfit::swarm {
 
-double saved(std::span<const float> caps, std::span<const float> distances) {
-  double sum = 0;
-  for (std::size_t i = 0; i < caps.size(); ++i) sum += distances[i] < caps[i] ? static_cast<double>(caps[i] - distances[i]) : 0.0;
-  return sum;
-}
-
 Support count_support(std::span<const float> distances, std::span<const float> caps, float tau, std::span<const std::uint8_t> beside,
                       const Support& before, std::span<const float> nearest) {
   kernels::SlabCounts counts;

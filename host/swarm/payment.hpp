@@ -33,8 +33,8 @@ inline constexpr float kUnexplained = 0.5F;
 /// nearer to these points than.
 inline constexpr double kOwnShare = 0.8;
 
-/// What a model at these distances saves of what the points may cost, in the caps' unit. NaN saves nothing.
-double saved(std::span<const float> caps, std::span<const float> distances);
+/// What a model at these distances saves of what the points may cost, in the caps' unit.
+using kernels::saved;
 
 /// NaN distances count for nothing. `beside` and `nearest` are empty or one a point, as in Near (deflation.hpp), and without `nearest` no
 /// point is shared; `before` is of the points that come before these.

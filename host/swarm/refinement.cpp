@@ -143,8 +143,7 @@ Expected<kernels::Reused<float>> measure_in_rows(const Ground& ground, std::span
   ModelRows rows(ground.points.frame(), models.size());
   for (const auto& [space, theta] : models) rows.add(*space, theta);
   kernels::Reused<float> all(ground.size() * models.size());
-  kernels::Reused<kernels::Evidence> evidence(models.size());
-  if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), rows.views(), all, evidence); !done) {
+  if (auto done = ground.evaluator.weigh(ground.view(), ground.weighing({}, ground.corner), rows.views(), all, {}); !done) {
     return tl::unexpected(to_error(done.error()));
   }
   return all;

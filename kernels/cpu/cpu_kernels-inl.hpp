@@ -545,6 +545,7 @@ const CpuKernels& kernel_table() {
                                 narrow,
                                 survey,
                                 survey_exactly,
+                                tell,
                                 weigh,
                                 begin_claim,
                                 claim,

@@ -139,6 +139,9 @@ struct CpuKernels {
   /// The sums in double, so that the moments tell a plane from a line.
   Look survey_exactly;
 
+  /// |dist| of each point; NaN for those that are not finite.
+  void (*tell)(ModelKind kind, const Strip& strip, const float* coefficients, float* distances);
+
   /// Of the points within the tolerance and their limit; see Weighing. `distances` may be null.
   void (*weigh)(ModelKind kind, const Strip& strip, const float* coefficients, float tolerance, float corner, StripSums& sums,
                 float* distances);

@@ -319,8 +319,8 @@ void PointPasses::survey_with(CpuKernels::Look look, const PointsView& points, S
 
 void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span<const ModelView> models, std::span<float> distances,
                         std::span<Evidence> evidence) {
-  const std::size_t runs = run_count(points);
-  evidence_.assign(runs * models.size(), {});
+  const std::size_t runs = run_count(points), sums_of = evidence.size();
+  evidence_.assign(runs * sums_of, {});
   for_strips(points, [&](Bench& bench, std::size_t run, std::size_t strip) {
     const bool any = bench.load(kernels_, points, strip, how.tolerance, how.caps);
     if (!any && distances.empty()) return;
@@ -328,13 +328,15 @@ void PointPasses::weigh(const PointsView& points, const Weighing& how, std::span
       std::array<float, kMaxCoefficients> coefficients{};
       alignas(64) std::array<float, kStripPoints> told;
       StripSums sums;
-      if (bench.centre(models[m], coefficients.data())) {
+      if (!bench.centre(models[m], coefficients.data())) {
+        sums.cost = bench.be_nowhere(told);
+      } else if (sums_of == 0) {
+        kernels_.tell(models[m].kind, bench.strip, coefficients.data(), told.data());
+      } else {
         kernels_.weigh(models[m].kind, bench.strip, coefficients.data(), how.tolerance, how.corner, sums,
                        distances.empty() ? nullptr : told.data());
-      } else {
-        sums.cost = bench.be_nowhere(told);
       }
-      bench.add(sums, evidence_[run * models.size() + m]);
+      if (sums_of > 0) bench.add(sums, evidence_[run * sums_of + m]);
       if (!distances.empty()) {
         bench.hand_back(std::numeric_limits<float>::quiet_NaN(), distances.subspan(m * points.count, points.count),
                         [&](std::size_t at, std::size_t count, float* to) { std::copy_n(told.data() + at, count, to); });

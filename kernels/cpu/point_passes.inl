@@ -228,6 +228,29 @@ void survey_exactly(const float* rows, std::size_t dimension, std::size_t count,
   with_dimension(dimension, [&]<std::size_t D>() HWY_ATTR { survey_of<D, WideSums<D>>(rows, count, pivot, sums, finite); });
 }
 
+/// What there is to tell of a point's distance: nothing where it is not finite.
+HWY_INLINE Vector told(Vector distance, Vector limit) {
+  const FloatTag d;
+  return hn::IfThenElse(hn::Ge(limit, hn::Zero(d)), distance, hn::Set(d, std::numeric_limits<float>::quiet_NaN()));
+}
+
+template <class Model>
+HWY_INLINE void tell_of(const Strip& strip, const float* HWY_RESTRICT coefficients, float* HWY_RESTRICT distances) {
+  constexpr std::size_t D = Model::traits.dimension;
+  const FloatTag d;
+  Vector k[Model::traits.coefficient_count];
+  for (int c = 0; c < Model::traits.coefficient_count; ++c) k[c] = hn::Set(d, coefficients[c]);
+  for (std::size_t i = 0; i < strip.count; i += lanes()) {
+    Vector x[D];
+    load_columns<D>(strip, i, x);
+    hn::StoreU(told(hn::Abs(Model::residual(VectorMath(), x, k)), hn::Load(d, strip.limit.data() + i)), d, distances + i);
+  }
+}
+
+void tell(ModelKind kind, const Strip& strip, const float* coefficients, float* distances) {
+  visit_model(kind, [&]<class Model>() HWY_ATTR { tell_of<Model>(strip, coefficients, distances); });
+}
+
 template <class Model>
 HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficients, float tolerance, float corner, StripSums& sums,
                          float* HWY_RESTRICT distances) {
@@ -246,10 +269,7 @@ HWY_INLINE void weigh_of(const Strip& strip, const float* HWY_RESTRICT coefficie
     const Vector distance = hn::Abs(Model::residual(VectorMath(), x, k));
     cost = hn::Add(cost, hn::Max(least(distance, limit), zero));
     const auto speaks = hn::And(hn::Le(distance, widest), hn::Le(distance, limit));
-    if (distances != nullptr) {
-      const Vector told = hn::IfThenElse(hn::Ge(limit, zero), distance, hn::Set(d, std::numeric_limits<float>::quiet_NaN()));
-      hn::StoreU(told, d, distances + i);
-    }
+    if (distances != nullptr) hn::StoreU(told(distance, limit), d, distances + i);
     if (hn::AllFalse(d, speaks)) continue;
     any = true;
     all.count = hn::Add(all.count, hn::IfThenElseZero(speaks, one));

@@ -7,7 +7,10 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+
+#include <hwy/contrib/math/math-inl.h>
 
 #include "kernels/cpu/tally_kernels.hpp"
 
@@ -26,6 +29,25 @@ using Integers = hn::Vec<IntTag>;
 using Mask = hn::Mask<FloatTag>;
 constexpr std::size_t kLanes = HWY_LANES(float);
 
+/// Both halves of a vector in double.
+struct Halves {
+  Wide low, high;
+
+  HWY_INLINE explicit Halves(Vector v) {
+    const DoubleTag d;
+#if HWY_TARGET == HWY_SCALAR
+    low = hn::PromoteTo(d, v);
+    high = hn::Zero(d);
+#else
+    const hn::Rebind<float, DoubleTag> narrow;
+    low = hn::PromoteTo(d, hn::LowerHalf(narrow, v));
+    high = hn::PromoteTo(d, hn::UpperHalf(narrow, v));
+#endif
+  }
+};
+
+HWY_INLINE double total(Wide v) { return hn::GetLane(hn::SumOfLanes(DoubleTag(), v)); }
+
 /// As SlabCounts, a lane each.
 struct LaneCounts {
   Integers open, inner, marked, shared, slabs[SlabCounts::kSlabs];
@@ -38,24 +60,18 @@ struct LaneCounts {
   }
 
   HWY_INLINE void add_square(Vector v) {
-    const DoubleTag d;
-#if HWY_TARGET == HWY_SCALAR
-    const Wide wide = hn::PromoteTo(d, v);
-#else
-    const hn::Rebind<float, DoubleTag> narrow;
-    const Wide low = hn::PromoteTo(d, hn::LowerHalf(narrow, v)), wide = hn::PromoteTo(d, hn::UpperHalf(narrow, v));
-    square = hn::MulAdd(low, low, square);
-#endif
-    square = hn::MulAdd(wide, wide, square);
+    const Halves halves(v);
+    square = hn::MulAdd(halves.low, halves.low, square);
+    square = hn::MulAdd(halves.high, halves.high, square);
   }
   HWY_INLINE void finish(SlabCounts& counts) {
-    const auto total = [](Integers v) HWY_ATTR { return static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(IntTag(), v))); };
-    counts.square += hn::GetLane(hn::SumOfLanes(DoubleTag(), square));
-    counts.open += total(open);
-    counts.inner += total(inner);
-    counts.marked += total(marked);
-    counts.shared += total(shared);
-    for (std::size_t k = 0; k < SlabCounts::kSlabs; ++k) counts.slabs[k] += total(slabs[k]);
+    const auto of_all = [](Integers v) HWY_ATTR { return static_cast<std::size_t>(hn::GetLane(hn::SumOfLanes(IntTag(), v))); };
+    counts.square += total(square);
+    counts.open += of_all(open);
+    counts.inner += of_all(inner);
+    counts.marked += of_all(marked);
+    counts.shared += of_all(shared);
+    for (std::size_t k = 0; k < SlabCounts::kSlabs; ++k) counts.slabs[k] += of_all(slabs[k]);
   }
 };
 
@@ -207,8 +223,44 @@ void sink(std::span<const float> distances, const Sinking& how, std::uint8_t* ma
   if (others != nullptr) std::copy_n(last_others, rest, others + whole);
 }
 
+double saved(std::span<const float> caps, std::span<const float> distances) {
+  const FloatTag d;
+  const std::size_t n = distances.size(), whole = n - n % kLanes;
+  Wide low = hn::Zero(DoubleTag()), high = low;
+  const auto add = [&](Vector cap, Vector distance) HWY_ATTR {
+    const Halves less(hn::IfThenElseZero(hn::Lt(distance, cap), hn::Sub(cap, distance)));
+    low = hn::Add(low, less.low);
+    high = hn::Add(high, less.high);
+  };
+  for (std::size_t i = 0; i < whole; i += kLanes) add(hn::LoadU(d, caps.data() + i), hn::LoadU(d, distances.data() + i));
+  if (whole < n) {
+    HWY_ALIGN float last_caps[kLanes] = {}, last_distances[kLanes] = {};
+    std::copy(caps.begin() + static_cast<std::ptrdiff_t>(whole), caps.end(), last_caps);
+    std::copy(distances.begin() + static_cast<std::ptrdiff_t>(whole), distances.end(), last_distances);
+    add(hn::Load(d, last_caps), hn::Load(d, last_distances));
+  }
+  return total(hn::Add(low, high));
+}
+
+void bend(std::span<float> distances, const Bending& how) {
+  const FloatTag d;
+  const Vector per_bend = hn::Set(d, 1 / (how.bend * how.unit)), unit = hn::Set(d, how.unit / std::log1p(1 / how.bend));
+  const Vector farthest = hn::Set(d, how.farthest * how.unit), beyond = hn::Set(d, how.beyond * how.unit);
+  const auto bent = [&](Vector distance) HWY_ATTR {
+    const Vector near = hn::Mul(unit, hn::Log1p(d, hn::Mul(distance, per_bend)));
+    return hn::IfThenElse(hn::Gt(distance, farthest), beyond, near);
+  };
+  const std::size_t n = distances.size(), whole = n - n % kLanes;
+  for (std::size_t i = 0; i < whole; i += kLanes) hn::StoreU(bent(hn::LoadU(d, distances.data() + i)), d, distances.data() + i);
+  if (whole == n) return;
+  HWY_ALIGN float last[kLanes] = {};
+  std::copy(distances.begin() + static_cast<std::ptrdiff_t>(whole), distances.end(), last);
+  hn::Store(bent(hn::Load(d, last)), d, last);
+  std::copy_n(last, n - whole, distances.data() + whole);
+}
+
 const TallyKernels& tally_kernels() {
-  static const TallyKernels table{hwy::TargetName(HWY_TARGET), count_slabs, sink};
+  static const TallyKernels table{hwy::TargetName(HWY_TARGET), count_slabs, sink, saved, bend};
   return table;
 }
 
@@ -238,6 +290,12 @@ void sink(std::span<const float> distances, const Sinking& how, std::span<std::u
   cpu::available_tally_kernels().front()->sink(distances, how, marks.empty() ? nullptr : marks.data(),
                                                others.empty() ? nullptr : others.data(), caps.data());
 }
+
+double saved(std::span<const float> caps, std::span<const float> distances) {
+  return cpu::available_tally_kernels().front()->saved(caps, distances);
+}
+
+void bend(std::span<float> distances, const Bending& how) { cpu::available_tally_kernels().front()->bend(distances, how); }
 
 }  // namespace swarmfit::kernels
 #endif  // HWY_ONCE

@@ -14,6 +14,8 @@ struct TallyKernels {
   void (*count_slabs)(const SlabsView& view, SlabCounts& counts);
   /// `marks` and `others` may be null.
   void (*sink)(std::span<const float> distances, const Sinking& how, std::uint8_t* marks, float* others, float* caps);
+  double (*saved)(std::span<const float> caps, std::span<const float> distances);
+  void (*bend)(std::span<float> distances, const Bending& how);
 };
 
 /// Best first: what this build knows and this processor can run. Never empty.

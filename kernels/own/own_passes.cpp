@@ -95,7 +95,7 @@ void weigh_own(const OwnModel& own, const PointsView& points, const Weighing& ho
         std::fill_n(told.begin() + static_cast<std::ptrdiff_t>(run.first), run.count, std::numeric_limits<float>::quiet_NaN());
         for (std::size_t k = 0; k < run.finite.size(); ++k) told[run.finite[k]] = static_cast<float>(run.distances[k]);
       }
-      for (std::size_t k = 0; k < run.finite.size(); ++k) {
+      for (std::size_t k = 0; k < run.finite.size() && !parts.empty(); ++k) {
         const double d = run.distances[k], limit = how.caps.empty() ? tolerance : static_cast<double>(how.caps[run.finite[k]]);
         parts[m].cost += std::min(d, limit);
         if (d <= tolerance && d <= limit) speak(points, run.finite[k], d, 1 / std::max(d / tolerance, corner), parts[m]);
