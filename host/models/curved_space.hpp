@@ -1,6 +1,7 @@
 // What the kinds without a closed least-squares form share: Gauss-Newton steps on a local chart, and the covariance that comes with it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -23,6 +24,9 @@ class SupportRows {
 
   std::size_t size() const noexcept { return support_.index.size(); }
   double weight(std::size_t k) const noexcept { return support_.weight[k]; }
+  /// visit(rows, weights) on runs of points, which together are all.
+  template <class Visit>
+  void in_runs(Visit&& visit) const;
   /// Columns of point k, in `room` where they are not kept.
   const double* row(std::size_t k, Room& room) const noexcept {
     if (!kept_.empty()) return kept_.data() + k * width_;
@@ -36,6 +40,23 @@ class SupportRows {
   std::size_t width_;
   kernels::Reused<double> kept_;
 };
+
+template <class Visit>
+void SupportRows::in_runs(Visit&& visit) const {
+  if (!kept_.empty()) return visit(std::span<const double>(kept_), support_.weight);
+  constexpr std::size_t kRun = 512;
+  kernels::Reused<double> rows;
+  Room room;
+  for (std::size_t first = 0; first < size(); first += kRun) {
+    const std::size_t count = std::min(kRun, size() - first);
+    rows.clear();
+    for (std::size_t k = first; k < first + count; ++k) {
+      const double* const from = row(k, room);
+      rows.insert(rows.end(), from, from + width_);
+    }
+    visit(std::span<const double>(rows), support_.weight.subspan(first, count));
+  }
+}
 
 /// A kind whose residual is linearised around a position, as `Linearised` does. Chart: `freedom()` numbers near 0, the position itself
 /// being 0.

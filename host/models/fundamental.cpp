@@ -9,8 +9,10 @@ namespace {
 
 using Svd = Eigen::JacobiSVD<Eigen::Matrix3d>;
 
-class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
+class Fundamental final : public Projective {
  public:
+  Fundamental() : Projective(kernels::PairResidual::fundamental) {}
+
   ModelType type() const noexcept override { return ModelType::fundamental; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::fundamental; }
   int minimal_sample() const noexcept override { return 7; }
@@ -61,19 +63,14 @@ class Fundamental final : public Linearised<Fundamental, Projective, 1, 9> {
   }
 
   /// Sampson's error.
-  bool linearise(const double* row, const Position& theta, Linear& at) const {
-    const Eigen::Vector4d p(row);
+  bool residual(const WorkingPoints& points, std::uint32_t index, const Position& theta, std::span<double> components) const override {
+    const Eigen::Vector4d p = points.point<4>(index);
     const Eigen::Map<const Matrix> m(theta.data());
     const Eigen::Vector3d x = first(p), y = second(p), right = m * x, left = m.transpose() * y;
     const double gradient = std::sqrt(right.head<2>().squaredNorm() + left.head<2>().squaredNorm());
     if (!(gradient > 1e-15)) return false;
-    const double e = y.dot(right) / gradient;
-    at.residual[0] = e;
-    // d(c / g) = (dc - e dg) / g, with g dg = right.d(right) + left.d(left) over the first two entries.
-    const Eigen::Vector3d r(right[0], right[1], 0), l(left[0], left[1], 0);
-    const Matrix by = (y * x.transpose() - (e / gradient) * (r * x.transpose() + y * l.transpose())) / gradient;
-    at.by_parameter.row(0) = Eigen::Map<const Vector9>(by.data()).transpose();
-    return std::isfinite(e);
+    components[0] = y.dot(right) / gradient;
+    return std::isfinite(components[0]);
   }
 
  protected:

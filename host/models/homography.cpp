@@ -20,8 +20,10 @@ bool from_basis(const Eigen::Matrix<double, 3, 4>& p, Eigen::Matrix3d& a) {
   return true;
 }
 
-class Homography final : public Linearised<Homography, Projective, 2, 9> {
+class Homography final : public Projective {
  public:
+  Homography() : Projective(kernels::PairResidual::homography) {}
+
   ModelType type() const noexcept override { return ModelType::homography; }
   kernels::ModelKind kind() const noexcept override { return kernels::ModelKind::homography; }
   int minimal_sample() const noexcept override { return 4; }
@@ -59,60 +61,24 @@ class Homography final : public Linearised<Homography, Projective, 2, 9> {
     return true;
   }
 
-  bool linearise(const double* row, const Position& theta, Linear& at) const {
-    Sampson error;
-    if (!sampson(row, theta, error)) return false;
-    const Eigen::RowVector3d x = first(Eigen::Vector4d(row)).transpose();
-    at.residual = error.residual;
-    for (int i = 0; i < 2; ++i) {
-      for (Eigen::Index r = 0; r < 3; ++r) at.by_parameter.block<1, 3>(i, 3 * r) = error.by_row(r, i) * x;
-    }
-    return true;
-  }
-  bool tell_residual(const double* row, const Position& theta, Linear& at) const {
-    Sampson error;
-    if (!sampson(row, theta, error)) return false;
-    at.residual = error.residual;
-    return true;
+  /// Sampson's error: c(x, H) = (u - x', v - y') with (u, v) = H x, divided by the root of its covariance under unit noise in all columns.
+  bool residual(const WorkingPoints& points, std::uint32_t index, const Position& theta, std::span<double> components) const override {
+    const Eigen::Vector4d p = points.point<4>(index);
+    const Eigen::Map<const Matrix> m(theta.data());
+    const Eigen::Vector3d x = first(p);
+    const double depth = m.row(2).dot(x);
+    if (!(std::abs(depth) > 1e-12)) return false;
+    const double scale = 1 / depth, u = scale * m.row(0).dot(x), v = scale * m.row(1).dot(x);
+    // Of the image by the point, along * along^T + I; and its root, lower triangular.
+    const double a = scale * (m(0, 0) - u * m(2, 0)), b = scale * (m(0, 1) - u * m(2, 1));
+    const double c = scale * (m(1, 0) - v * m(2, 0)), d = scale * (m(1, 1) - v * m(2, 1));
+    const double first_root = std::sqrt(1 + a * a + b * b), mixed = (a * c + b * d) / first_root;
+    components[0] = (u - p[2]) / first_root;
+    components[1] = (v - p[3] - mixed * components[0]) / std::sqrt(1 + c * c + d * d - mixed * mixed);
+    return std::isfinite(components[0]) && std::isfinite(components[1]);
   }
 
  protected:
-  /// As for any kind, but that what a point adds to the information is a product of two matrices of three rows.
-  Equations equations(const SupportRows& support, const Position& theta) const override {
-    using Six = Eigen::Array<double, 6, 1>;  // a symmetric matrix of three rows
-    Six blocks[6];
-    for (Six& block : blocks) block.setZero();
-    Matrix gradient = Matrix::Zero();
-    Equations sum;
-    SupportRows::Room room;
-    for (std::size_t k = 0; k < support.size(); ++k) {
-      const double* const row = support.row(k, room);
-      Sampson at;
-      if (!sampson(row, theta, at)) continue;
-      const double w = support.weight(k), x = row[0], y = row[1];
-      const Eigen::Vector3d by_one = at.by_row.col(0), by_other = at.by_row.col(1);
-      Six by_row, point;
-      by_row << by_one[0] * by_one[0] + by_other[0] * by_other[0], by_other[0] * by_other[1],
-          by_one[0] * by_one[2] + by_other[0] * by_other[2], by_other[1] * by_other[1], by_other[1] * by_other[2],
-          by_one[2] * by_one[2] + by_other[2] * by_other[2];
-      point << w * x * x, w * x * y, w * x, w * y * y, w * y, w;
-      for (int b = 0; b < 6; ++b) blocks[b] += by_row[b] * point;
-      const Eigen::Vector3d pull = w * (at.by_row * at.residual);
-      gradient += pull * Eigen::RowVector3d(x, y, 1);
-      sum.squares += w * at.residual.squaredNorm();
-      ++sum.used;
-    }
-    static constexpr int kPlace[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-    Eigen::Matrix<double, 9, 9> information;
-    for (int i = 0; i < 9; ++i) {
-      for (int j = 0; j < 9; ++j) information(i, j) = blocks[kPlace[i / 3][j / 3]][kPlace[i % 3][j % 3]];
-    }
-    const Basis chart = basis(theta);
-    sum.information = chart.transpose() * information * chart;
-    sum.gradient = chart.transpose() * Eigen::Map<const Vector9>(gradient.data());
-    return sum;
-  }
-
   /// The tangent space of the unit sphere: what the Householder reflection that takes theta to an axis leaves.
   Basis basis(const Position& theta) const override {
     Vector9 u = theta;
@@ -127,34 +93,6 @@ class Homography final : public Linearised<Homography, Projective, 2, 9> {
   }
 
  private:
-  struct Sampson {
-    Eigen::Vector2d residual;
-    /// Derivative of each component by an entry of the matrix: that of its row here, times the point's coordinate (x, y, 1).
-    Eigen::Matrix<double, 3, 2> by_row;
-  };
-
-  /// Sampson's error: c(x, H) = (u - x', v - y') with (u, v) = H x, divided by the root of its covariance under unit noise in all columns.
-  static bool sampson(const double* row, const Position& theta, Sampson& at) {
-    const Eigen::Vector4d p(row);
-    const Eigen::Map<const Matrix> m(theta.data());
-    const Eigen::Vector3d x = first(p);
-    const double depth = m.row(2).dot(x);
-    if (!(std::abs(depth) > 1e-12)) return false;
-    const double scale = 1 / depth, u = scale * m.row(0).dot(x), v = scale * m.row(1).dot(x);
-    // Of the image by the point, along * along^T + I; and its root, lower triangular.
-    const double a = scale * (m(0, 0) - u * m(2, 0)), b = scale * (m(0, 1) - u * m(2, 1));
-    const double c = scale * (m(1, 0) - v * m(2, 0)), d = scale * (m(1, 1) - v * m(2, 1));
-    const double first_root = std::sqrt(1 + a * a + b * b), mixed = (a * c + b * d) / first_root;
-    const double second_root = std::sqrt(1 + c * c + d * d - mixed * mixed);
-    const double one = 1 / first_root, other = 1 / second_root;
-    at.residual[0] = one * (u - p[2]);
-    at.residual[1] = other * (v - p[3] - mixed * at.residual[0]);
-    const double by_first = one * scale, by_second = other * scale, share = other * mixed * by_first;
-    at.by_row.col(0) << by_first, 0, -u * by_first;
-    at.by_row.col(1) << -share, by_second, u * share - v * by_second;
-    return std::isfinite(at.residual[0]) && std::isfinite(at.residual[1]);
-  }
-
   /// A view of a plane from its one side never turns a triangle over: of the four triangles all or none may change sign together.
   static bool same_turns(const Eigen::Matrix<double, 3, 4>& a, const Eigen::Matrix<double, 3, 4>& b) {
     static constexpr int kTriangles[4][3] = {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}};

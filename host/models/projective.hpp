@@ -1,10 +1,12 @@
-// What homography and fundamental share: a 3x3 matrix up to scale, kept as a unit vector of 9, M and -M being one model.
+// What homography and fundamental share: a 3x3 matrix up to scale, kept as a unit vector of 9, M and -M being one model; and least squares on
+// vectors of correspondences (kernels/pair_sums.hpp).
 #pragma once
 
 #include <cmath>
 
 #include "host/models/curved_space.hpp"
 #include "host/models/sphere_maps.hpp"
+#include "kernels/pair_sums.hpp"
 
 namespace swarmfit::models {
 
@@ -12,6 +14,8 @@ class Projective : public CurvedSpace {
  public:
   using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   using Vector9 = Eigen::Matrix<double, 9, 1>;
+
+  explicit Projective(kernels::PairResidual residual) : residual_(residual) {}
 
   int least_rank() const noexcept override { return 2; }
   bool costly_samples() const noexcept override { return true; }
@@ -30,7 +34,26 @@ class Projective : public CurvedSpace {
     velocity = v;
   }
 
+  int residual_components() const noexcept override { return residual_ == kernels::PairResidual::homography ? 2 : 1; }
+
  protected:
+  Equations equations(const SupportRows& support, const Position& theta) const override {
+    kernels::PairSums sums;
+    support.in_runs([&](std::span<const double> rows, std::span<const double> weights) {
+      kernels::add_pair_sums(residual_, theta.data(), {rows, weights}, sums);
+    });
+    const Basis chart = basis(theta);
+    return {chart.transpose() * Eigen::Map<const Eigen::Matrix<double, 9, 9>>(sums.information.data()) * chart,
+            chart.transpose() * Eigen::Map<const Vector9>(sums.gradient.data()), sums.squares, sums.used};
+  }
+  double squares(const SupportRows& support, const Position& theta) const override {
+    double sum = 0;
+    support.in_runs([&](std::span<const double> rows, std::span<const double> weights) {
+      sum += kernels::pair_squares(residual_, theta.data(), {rows, weights});
+    });
+    return sum;
+  }
+
   static Matrix matrix(const Position& theta) { return Eigen::Map<const Matrix>(theta.data()); }
   static Position position(const Matrix& m) {
     Position theta = Eigen::Map<const Vector9>(m.data());
@@ -64,6 +87,9 @@ class Projective : public CurvedSpace {
   }
   static Eigen::Vector3d first(const Eigen::Vector4d& p) { return {p[0], p[1], 1}; }
   static Eigen::Vector3d second(const Eigen::Vector4d& p) { return {p[2], p[3], 1}; }
+
+ private:
+  kernels::PairResidual residual_;
 };
 
 }  // namespace swarmfit::models
