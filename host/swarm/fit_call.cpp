@@ -1,7 +1,6 @@
 #include "host/swarm/fit_call.hpp"
 
 #include <algorithm>
-#include <thread>
 
 #include <fmt/format.h>
 
@@ -257,9 +256,7 @@ Expected<FitCall::Found> FitCall::search_twice(const std::vector<Model>& warm_st
   first.watched_by(watch());
   again.watched_by(watch());
   if (points_set_ && !apart) first.points_are_set();
-  const bool at_once = options_.threads != 1 && std::thread::hardware_concurrency() > 1;
-  const auto how = !apart ? Together::on_one_evaluator : at_once ? Together::at_once : Together::in_turn;
-  auto done = swarm::search_twice(first, again, stop_again, how, on_model_, warm_start, result, known_);
+  auto done = swarm::search_twice(first, again, stop_again, apart ? &evaluator_ : nullptr, on_model_, warm_start, result, known_);
   if (!done) return tl::unexpected(done.error());
   return found_by(first);
 }

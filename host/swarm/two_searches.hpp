@@ -11,17 +11,12 @@
 
 namespace swarmfit::swarm {
 
-/// How two searches share what they work on.
-enum class Together {
-  on_one_evaluator,  ///< one after the other
-  in_turn,           ///< on one each, one after the other
-  at_once,           ///< on one each, the second in a thread of its own, if there is one to be had
-};
-
-/// Runs `first`, and `again` by other random numbers, and ends the first with what both have found. The result does not depend on `how`.
+/// Runs `first`, and `again` by other random numbers, and ends the first with what both have found. With `workers`, on whose threads they
+/// run side by side, each has a back end of its own; without, they run one after the other on the one they share. The result is the same.
 /// The first runs in the caller's thread; callbacks and a warm start are its alone. Where the caller has enough, the second is told to
 /// stop, by `stop_again` that its limits know, and does not count.
-Expected<> search_twice(MultiModel& first, MultiModel& again, std::stop_source& stop_again, Together how, const ModelCallback& on_model,
-                        const std::vector<Model>& warm_start, FitResult& result, std::span<const Known> known);
+Expected<> search_twice(MultiModel& first, MultiModel& again, std::stop_source& stop_again, kernels::FitnessEvaluator* workers,
+                        const ModelCallback& on_model, const std::vector<Model>& warm_start, FitResult& result,
+                        std::span<const Known> known);
 
 }  // namespace swarmfit::swarm
