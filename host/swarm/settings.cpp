@@ -168,7 +168,7 @@ Settings for_kind(Settings s, ModelType type) {
   s.particles = crowd.particles;
   if (type == ModelType::plane) return s;
   constexpr int kSoon = 5;  // still steps after which swarms of these kinds find no more
-  if (type == ModelType::line2d || type == ModelType::circle2d || type == ModelType::homography) s.stall = kSoon;
+  if (type == ModelType::line2d || type == ModelType::circle2d) s.stall = kSoon;
   // Refinement brings the best of a swarm that has hardly flown to the same place, where what is looked for stands out.
   if (type == ModelType::line2d || type == ModelType::circle2d) s.eager_stall = 1;
   if (type == ModelType::line2d) {
@@ -183,11 +183,9 @@ Settings for_kind(Settings s, ModelType type) {
   s.renewal_share = 0.75;
   s.patience = 2;
   s.prices = type == ModelType::homography ? LabelPrices{0.15, 5.5} : LabelPrices{0.25, 5.5, 0.8, 0.5};
-  // Seven points hit one body seldom: two searches that end sooner find more than one that takes its time.
-  if (type == ModelType::fundamental) {
-    s.searches = 2;
-    s.stall = 7;
-  }
+  // Seven points hit one body seldom, and where a surface ends four do: two searches that end sooner find more than one that takes its time.
+  s.searches = 2;
+  s.stall = type == ModelType::homography ? 3 : 7;
   return s;
 }
 
