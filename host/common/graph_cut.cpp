@@ -65,6 +65,7 @@ void PottsEnergy::close() {
   }
   takers_.clear();
   takers_.reserve(choices_.size());
+  piece_takers_.clear();
   for (Piece& piece : pieces_) find_takers(piece);
 }
 
@@ -74,14 +75,14 @@ void PottsEnergy::forget_labels() {
 }
 
 void PottsEnergy::make_graph() {
-  std::vector<std::int32_t> first(nodes() + 1, 0);
+  kernels::Reused<std::int32_t> first(nodes() + 1, 0);
   for (const Edge& e : edges_) {
     ++first[static_cast<std::size_t>(e.i) + 1];
     ++first[static_cast<std::size_t>(e.j) + 1];
   }
   std::partial_sum(first.begin(), first.end(), first.begin());
-  std::vector<std::int32_t> next(first.begin(), first.end() - 1);
-  std::vector<CutGraph::Arc> arcs(2 * edges_.size());
+  kernels::Reused<std::int32_t> next(first.begin(), first.end() - 1);
+  kernels::Reused<CutGraph::Arc> arcs(2 * edges_.size());
   weight_.resize(arcs.size());
   for (const Edge& e : edges_) {
     const std::int32_t there = next[static_cast<std::size_t>(e.i)]++, back = next[static_cast<std::size_t>(e.j)]++;
@@ -93,47 +94,55 @@ void PottsEnergy::make_graph() {
 }
 
 void PottsEnergy::find_pieces() {
-  std::vector<bool> met(nodes(), false);
+  kernels::Reused<std::uint8_t> met(nodes(), 0);
+  piece_nodes_.reserve(nodes());
   for (std::size_t seed = 0; seed < nodes(); ++seed) {
-    if (met[seed]) continue;
-    std::vector<std::int32_t>& inside = pieces_.emplace_back().nodes;
-    inside.assign(1, static_cast<std::int32_t>(seed));
-    met[seed] = true;
-    for (std::size_t k = 0; k < inside.size(); ++k)
-      for (std::int32_t a = graph_.first_arc(inside[k]); a < graph_.last_arc(inside[k]); ++a) {
+    if (met[seed] != 0) continue;
+    Piece& piece = pieces_.emplace_back();
+    piece.first_node = piece_nodes_.size();
+    piece_nodes_.push_back(static_cast<std::int32_t>(seed));
+    met[seed] = 1;
+    for (std::size_t k = piece.first_node; k < piece_nodes_.size(); ++k)
+      for (std::int32_t a = graph_.first_arc(piece_nodes_[k]); a < graph_.last_arc(piece_nodes_[k]); ++a) {
         const std::int32_t j = graph_.arc(a).head;
-        if (met[static_cast<std::size_t>(j)]) continue;
-        met[static_cast<std::size_t>(j)] = true;
-        inside.push_back(j);
+        if (met[static_cast<std::size_t>(j)] != 0) continue;
+        met[static_cast<std::size_t>(j)] = 1;
+        piece_nodes_.push_back(j);
       }
+    piece.last_node = piece_nodes_.size();
   }
   // The longest work first, so that threads end together.
-  std::stable_sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) { return a.nodes.size() > b.nodes.size(); });
+  std::sort(pieces_.begin(), pieces_.end(), [](const Piece& a, const Piece& b) {
+    const std::size_t one = a.last_node - a.first_node, other = b.last_node - b.first_node;
+    return one != other ? one > other : a.first_node < b.first_node;
+  });
 }
 
 void PottsEnergy::find_takers(Piece& piece) {
-  piece.takers.clear();
+  piece.first_takers = piece_takers_.size();
   // Counted first, then laid out label by label.
-  for (const std::int32_t i : piece.nodes)
+  for (const std::int32_t i : nodes_of(piece))
     for (const Choice& choice : choices(static_cast<std::size_t>(i))) {
       if (choice.label >= place_.size()) place_.resize(choice.label + std::size_t{1}, kNowhere);
       std::size_t& place = place_[choice.label];
       if (place == kNowhere) {
-        place = piece.takers.size();
-        piece.takers.push_back({choice.label, 0, 0, true});
+        place = piece_takers_.size();
+        piece_takers_.push_back({choice.label, 0, 0, true});
       }
-      ++piece.takers[place].last;
+      ++piece_takers_[place].last;
     }
+  piece.last_takers = piece_takers_.size();
   std::size_t first = takers_.size();
-  for (Takers& t : piece.takers) {
+  for (Takers& t : takers_of(piece)) {
     const std::size_t count = t.last;
     t.first = t.last = first;
     first += count;
   }
   takers_.resize(first);
-  for (const std::int32_t i : piece.nodes)
-    for (const Choice& choice : choices(static_cast<std::size_t>(i))) takers_[piece.takers[place_[choice.label]].last++] = {i, choice.cost};
-  for (const Takers& t : piece.takers) place_[t.label] = kNowhere;
+  for (const std::int32_t i : nodes_of(piece))
+    for (const Choice& choice : choices(static_cast<std::size_t>(i)))
+      takers_[piece_takers_[place_[choice.label]].last++] = {i, choice.cost};
+  for (const Takers& t : takers_of(piece)) place_[t.label] = kNowhere;
 }
 
 /// x = 0 (source side) keeps its label, x = 1 (sink side) takes alpha. What a pair (i, j), i < j, costs at (x_i, x_j) is split into a part
@@ -179,10 +188,10 @@ PottsEnergy::Cost PottsEnergy::fall_of(std::span<const std::int32_t> part, Label
 }
 
 /// A node that took alpha is news to every other label that it or a neighbour may take.
-void PottsEnergy::make_stale(Piece& piece, std::size_t node, Label alpha) const {
+void PottsEnergy::make_stale(const Piece& piece, std::size_t node, Label alpha) {
   const auto mark = [&](std::size_t i) {
     for (const Choice& choice : choices(i))
-      for (Takers& t : piece.takers) t.stale = t.stale || (t.label == choice.label && t.label != alpha);
+      for (Takers& t : takers_of(piece)) t.stale = t.stale || (t.label == choice.label && t.label != alpha);
   };
   mark(node);
   for (auto a = graph_.first_arc(static_cast<std::int32_t>(node)); a < graph_.last_arc(static_cast<std::int32_t>(node)); ++a)
@@ -190,7 +199,7 @@ void PottsEnergy::make_stale(Piece& piece, std::size_t node, Label alpha) const 
 }
 
 void PottsEnergy::count_borders(const Piece& piece, std::span<const Label> labels) {
-  for (const std::int32_t i : piece.nodes) {
+  for (const std::int32_t i : nodes_of(piece)) {
     std::int32_t& count = borders_[static_cast<std::size_t>(i)] = 0;
     for (std::int32_t a = graph_.first_arc(i); a < graph_.last_arc(i); ++a)
       count += labels[static_cast<std::size_t>(graph_.arc(a).head)] != labels[static_cast<std::size_t>(i)] ? 1 : 0;
@@ -207,7 +216,7 @@ void PottsEnergy::relabel(std::int32_t i, Label alpha, std::vector<Label>& label
   }
 }
 
-PottsEnergy::Cost PottsEnergy::expand(Piece& piece, const Takers& takers, std::vector<Label>& labels) {
+PottsEnergy::Cost PottsEnergy::expand(const Piece& piece, const Takers& takers, std::vector<Label>& labels) {
   const Label alpha = takers.label;
   kernels::Reused<std::int32_t> part;
   part.reserve(takers.last - takers.first);
@@ -245,9 +254,9 @@ PottsEnergy::Cost PottsEnergy::expand(Piece& piece, const Takers& takers, std::v
 
 PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) {
   Cost fall = 0;
-  for (Piece& piece : pieces_) {
+  for (const Piece& piece : pieces_) {
     count_borders(piece, labels);
-    for (const Takers& takers : piece.takers)
+    for (const Takers& takers : takers_of(piece))
       if (takers.label == alpha) fall += expand(piece, takers, labels);
   }
   return fall;
@@ -255,16 +264,16 @@ PottsEnergy::Cost PottsEnergy::expand(Label alpha, std::vector<Label>& labels) {
 
 PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles, std::vector<Label>& labels, int threads) {
   std::atomic<Cost> fall = 0;  // whole numbers: the sum is the same in any order
-  in_parallel(static_cast<int>(pieces_.size()), 1, threads, [&](int first, int last) {
+  const auto some = [&](int first, int last) {
     for (int k = first; k < last; ++k) {
-      Piece& piece = pieces_[static_cast<std::size_t>(k)];
-      for (Takers& takers : piece.takers) takers.stale = true;
+      const Piece& piece = pieces_[static_cast<std::size_t>(k)];
+      for (Takers& takers : takers_of(piece)) takers.stale = true;
       count_borders(piece, labels);
       bool still = false;
       for (int cycle = 0; cycle < cycles && !still; ++cycle) {
         still = true;
         for (const Label alpha : order)
-          for (Takers& takers : piece.takers) {
+          for (Takers& takers : takers_of(piece)) {
             if (takers.label != alpha || !takers.stale) continue;
             takers.stale = false;
             const Cost fell = expand(piece, takers, labels);
@@ -273,7 +282,8 @@ PottsEnergy::Cost PottsEnergy::minimise(std::span<const Label> order, int cycles
           }
       }
     }
-  });
+  };
+  in_parallel(static_cast<int>(pieces_.size()), 1, threads, std::cref(some));  // a reference fits where a function is kept
   return fall;
 }
 

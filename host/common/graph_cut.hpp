@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/common/min_cut.hpp"
+#include "kernels/reused.hpp"
 
 namespace swarmfit::common {
 
@@ -67,9 +68,9 @@ class PottsEnergy {
     std::size_t first, last;
     bool stale;  ///< something has changed since the label was last expanded
   };
+  /// Nodes that edges connect, and who of them may take what: ranges of `piece_nodes_` and `piece_takers_`.
   struct Piece {
-    std::vector<std::int32_t> nodes;
-    std::vector<Takers> takers;
+    std::size_t first_node = 0, last_node = 0, first_takers = 0, last_takers = 0;
   };
   static constexpr std::size_t kNowhere = static_cast<std::size_t>(-1);
   enum class Role : std::uint8_t { fixed, may_take, takes };
@@ -79,32 +80,40 @@ class PottsEnergy {
     if (a == b) return 0;
     return a == ground_ || b == ground_ ? weight / 2 : weight;
   }
+  std::span<const std::int32_t> nodes_of(const Piece& piece) const noexcept {
+    return std::span(piece_nodes_).subspan(piece.first_node, piece.last_node - piece.first_node);
+  }
+  std::span<Takers> takers_of(const Piece& piece) noexcept {
+    return std::span(piece_takers_).subspan(piece.first_takers, piece.last_takers - piece.first_takers);
+  }
   std::span<const Choice> choices(std::size_t node) const;
   const Choice* find(std::size_t node, Label label) const;
   void make_graph();
   void find_pieces();
   void find_takers(Piece& piece);
-  Cost expand(Piece& piece, const Takers& takers, std::vector<Label>& labels);
+  Cost expand(const Piece& piece, const Takers& takers, std::vector<Label>& labels);
   /// Of a node that may take alpha at a cost of `take`.
   void set_capacities(std::int32_t node, Label alpha, std::int32_t take, std::span<const Label> labels);
   Cost fall_of(std::span<const std::int32_t> part, Label alpha, std::span<const Label> labels) const;
-  void make_stale(Piece& piece, std::size_t node, Label alpha) const;
+  void make_stale(const Piece& piece, std::size_t node, Label alpha);
   void count_borders(const Piece& piece, std::span<const Label> labels);
   void relabel(std::int32_t node, Label alpha, std::vector<Label>& labels);
 
-  std::vector<std::size_t> first_;  // of each node's choices
-  std::vector<Choice> choices_;
-  std::vector<Edge> edges_;
+  kernels::Reused<std::size_t> first_;  // of each node's choices
+  kernels::Reused<Choice> choices_;
+  kernels::Reused<Edge> edges_;
   std::int32_t ground_ = -1;  // none
   // Made by close().
   CutGraph graph_;
-  std::vector<std::int32_t> weight_;  // one an arc
-  std::vector<Piece> pieces_;         // those with most nodes first
-  std::vector<Taker> takers_;
-  std::vector<std::size_t> place_;     // of a label among a piece's takers, while these are found
-  std::vector<Role> role_;             // one a node, within an expansion
-  std::vector<std::int32_t> borders_;  // of each node, how many of its neighbours have another label, while labels change
-  std::vector<std::int32_t> take_;     // of each node, what it costs to take the label of an expansion
+  kernels::Reused<std::int32_t> weight_;  // one an arc
+  kernels::Reused<Piece> pieces_;         // those with most nodes first
+  kernels::Reused<std::int32_t> piece_nodes_;
+  kernels::Reused<Takers> piece_takers_;
+  kernels::Reused<Taker> takers_;
+  kernels::Reused<std::size_t> place_;     // of a label among a piece's takers, while these are found
+  kernels::Reused<Role> role_;             // one a node, within an expansion
+  kernels::Reused<std::int32_t> borders_;  // of each node, how many of its neighbours have another label, while labels change
+  kernels::Reused<std::int32_t> take_;     // of each node, what it costs to take the label of an expansion
 };
 
 }  // namespace swarmfit::common

@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "kernels/reused.hpp"
+
 namespace swarmfit::common {
 
 /// Boykov and Kolmogorov's search with one tree instead of two: of the nodes that still reach the sink. It grows until it meets a node that
@@ -37,7 +39,7 @@ class CutSearch {
 
   CutGraph& graph_;
   const CutGraph::Prepare& prepare_;
-  std::vector<std::int32_t> orphans_;
+  kernels::Reused<std::int32_t> orphans_;
   std::int32_t first_ = kNone, last_ = kNone;  // active nodes
   std::int32_t time_ = 0;
 };
@@ -179,7 +181,7 @@ void CutSearch::run(std::span<const std::int32_t> part) {
   for (const std::int32_t i : part) node(i).put_off = false;
 }
 
-CutGraph::CutGraph(std::vector<std::int32_t> first, std::vector<Arc> arcs)
+CutGraph::CutGraph(kernels::Reused<std::int32_t> first, kernels::Reused<Arc> arcs)
     : first_(std::move(first)), arcs_(std::move(arcs)), capacity_(arcs_.size()), nodes_(first_.empty() ? 0 : first_.size() - 1) {}
 
 void CutGraph::cut(std::span<const std::int32_t> part, const Prepare& prepare) { CutSearch(*this, prepare).run(part); }

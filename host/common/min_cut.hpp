@@ -5,7 +5,8 @@
 #include <cstdint>
 #include <functional>
 #include <span>
-#include <vector>
+
+#include "kernels/reused.hpp"
 
 namespace swarmfit::common {
 
@@ -19,7 +20,7 @@ class CutGraph {
 
   CutGraph() = default;
   /// Arcs of node i are [first[i], first[i + 1]).
-  CutGraph(std::vector<std::int32_t> first, std::vector<Arc> arcs);
+  CutGraph(kernels::Reused<std::int32_t> first, kernels::Reused<Arc> arcs);
 
   std::int32_t first_arc(std::int32_t node) const noexcept { return first_[static_cast<std::size_t>(node)]; }
   std::int32_t last_arc(std::int32_t node) const noexcept { return first_[static_cast<std::size_t>(node) + 1]; }
@@ -52,10 +53,10 @@ class CutGraph {
     bool put_off = false;
   };
 
-  std::vector<std::int32_t> first_;
-  std::vector<Arc> arcs_;
-  std::vector<std::int32_t> capacity_;
-  std::vector<Node> nodes_;
+  kernels::Reused<std::int32_t> first_;
+  kernels::Reused<Arc> arcs_;
+  kernels::Reused<std::int32_t> capacity_;
+  kernels::Reused<Node> nodes_;
 };
 
 }  // namespace swarmfit::common

@@ -62,19 +62,14 @@ float Labelling::unbent(float cost) const {
   return ground_.tau * bend * std::expm1(cost / ground_.tau * per_bend_);
 }
 
-Expected<kernels::Reused<kernels::Reused<float>>> Labelling::measure(std::span<const models::Position> models) const {
+Expected<Distances> Labelling::measure(std::span<const models::Position> models) const {
   ModelRows rows(ground_.points.frame(), models.size());
   for (const models::Position& theta : models) rows.add(ground_.space, theta);
-  const std::size_t points = part_.index().size();
-  kernels::Reused<float> all(points * models.size());
-  if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), all, {}); !done) {
+  Distances distances(models.size(), part_.index().size());
+  if (auto done = ground_.evaluator.weigh(part_.view(), {ground_.tau, 1, {}}, rows.views(), distances.all(), {}); !done) {
     return tl::unexpected(to_error(done.error()));
   }
-  if (prices_.bend > 0) kernels::bend(all, {ground_.tau, static_cast<float>(prices_.bend), farthest_, kBeyond});
-  kernels::Reused<kernels::Reused<float>> distances(models.size());
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    distances[m].assign(all.begin() + static_cast<std::ptrdiff_t>(m * points), all.begin() + static_cast<std::ptrdiff_t>((m + 1) * points));
-  }
+  if (prices_.bend > 0) kernels::bend(distances.all(), {ground_.tau, static_cast<float>(prices_.bend), farthest_, kBeyond});
   return distances;
 }
 
@@ -144,7 +139,7 @@ Expected<bool> Labelling::refit(State& state) {
   if (moved.empty()) return false;
   auto distances = measure(to);
   if (!distances) return tl::unexpected(distances.error());
-  for (std::size_t k = 0; k < moved.size(); ++k) next.distances[moved[k]] = std::move((*distances)[k]);
+  for (std::size_t k = 0; k < moved.size(); ++k) next.distances.set(moved[k], (*distances)[k]);
   label(next);
   if (!(next.energy < state.energy - kLeastFall)) return false;
   state = std::move(next);
@@ -163,7 +158,7 @@ Expected<> Labelling::alternate(State& state, double hopeless) {
 void Labelling::remove(State& state, std::size_t model) {
   const auto at = static_cast<std::ptrdiff_t>(model);
   state.models.erase(state.models.begin() + at);
-  state.distances.erase(state.distances.begin() + at);
+  state.distances.remove(model);
   state.fitted.erase(state.fitted.begin() + at);
   for (std::uint16_t& l : state.labels) {
     if (l == model + 1) l = 0;
@@ -238,18 +233,19 @@ void Labelling::costs(std::span<float> costs) const {
   }
 }
 
-Expected<bool> Labelling::try_one(models::Position proposal, kernels::Reused<float> distances) {
-  auto gain = fit_to_gain(proposal, distances);
+Expected<bool> Labelling::try_one(models::Position proposal, std::span<const float> distances) {
+  kernels::Reused<float> fitted(distances.begin(), distances.end());
+  auto gain = fit_to_gain(proposal, fitted);
   if (!gain) return tl::unexpected(gain.error());
   if (*gain < kPaying * prices_.model) return false;
   State with = state_;
   with.models.push_back(std::move(proposal));
-  with.distances.push_back(std::move(distances));
+  with.distances.add(fitted);
   with.fitted.push_back(0);
   return adopt_one_more(std::move(with), kTooDear);
 }
 
-void Labelling::weigh_gains(std::span<const kernels::Reused<float>> distances, std::vector<double>& gains) const {
+void Labelling::weigh_gains(const Distances& distances, std::vector<double>& gains) const {
   const kernels::Reused<float> now = present_costs();
   for (std::size_t p = 0; p < gains.size(); ++p) {
     // What promises nothing now is not asked again.

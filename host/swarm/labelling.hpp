@@ -13,6 +13,7 @@
 
 #include "host/common/graph_cut.hpp"
 #include "host/models/neighbours.hpp"
+#include "host/swarm/distances.hpp"
 #include "host/swarm/refinement.hpp"
 #include "host/swarm/settings.hpp"
 #include "host/swarm/subset.hpp"
@@ -84,14 +85,14 @@ class Labelling {
  private:
   struct State {
     kernels::Reused<models::Position> models;
-    kernels::Reused<kernels::Reused<float>> distances;  // of each model, one a point of the part, as they count: bent
+    Distances distances;                    // to the points of the part, as they count: bent
     kernels::Reused<std::uint64_t> fitted;  // of each model, what tells the points that it was last fitted to, and how often; 0 none
     kernels::Reused<std::uint16_t> labels;  // one a point of the part
     double energy = 0;
   };
 
   /// Of each model to each point of the part, bent.
-  Expected<kernels::Reused<kernels::Reused<float>>> measure(std::span<const models::Position> models) const;
+  Expected<Distances> measure(std::span<const models::Position> models) const;
   /// Of what a distance counts as, where they are bent, the distance [data unit].
   float unbent(float cost) const;
   /// The labels of the state's models, from those it has where they may stay; and the energy. `only`: not empty where no other labels may
@@ -99,7 +100,7 @@ class Labelling {
   void label(State& state, std::span<const std::uint16_t> only = {});
   Expected<bool> refit(State& state);
   Expected<bool> drop_one();
-  Expected<bool> try_one(models::Position proposal, kernels::Reused<float> distances);
+  Expected<bool> try_one(models::Position proposal, std::span<const float> distances);
   /// Fits a proposal to what it wins of what the points cost as things stand; what it then saves, in units of tau.
   Expected<double> fit_to_gain(models::Position& theta, kernels::Reused<float>& distances) const;
   double cost(std::size_t point) const;
@@ -121,14 +122,14 @@ class Labelling {
   template <class Takes>
   void fit_to(Takes&& takes, models::Position& theta) const;
   /// What each proposal would save of what the points cost as things stand, in units of tau.
-  void weigh_gains(std::span<const kernels::Reused<float>> distances, std::vector<double>& gains) const;
+  void weigh_gains(const Distances& distances, std::vector<double>& gains) const;
 
   const Ground& ground_;
   const Subset& part_;
   LabelPrices prices_;
   float per_bend_ = 0, farthest_ = 0;  // log(1 + 1 / bend), and the farthest distance of a point that may be owned [tau], where they bend
-  std::vector<std::pair<std::pair<int, int>, int>> edges_;  // two points, and how many of them ask for the other
-  common::PottsEnergy potts_;                               // its edges are those of `edges_` at a price of `potts_smoothness_`
+  kernels::Reused<std::pair<std::pair<int, int>, int>> edges_;  // two points, and how many of them ask for the other
+  common::PottsEnergy potts_;                                   // its edges are those of `edges_` at a price of `potts_smoothness_`
   double potts_smoothness_ = -1;
   State state_;
   std::vector<std::size_t> kept_;

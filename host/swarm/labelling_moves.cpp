@@ -104,11 +104,11 @@ Expected<double> Labelling::fit_to_gain(models::Position& theta, kernels::Reused
     fit_to([&](std::size_t i) { return distances[i] < now[i]; }, next);
     auto measured = measure({&next, 1});
     if (!measured) return tl::unexpected(measured.error());
-    const double better = saved(now, measured->front());
+    const double better = saved(now, (*measured)[0]);
     if (!(better > gain)) break;
     gain = better;
     theta = std::move(next);
-    distances = std::move(measured->front());
+    distances.assign((*measured)[0].begin(), (*measured)[0].end());
   }
   return gain / static_cast<double>(ground_.tau);
 }
@@ -121,14 +121,14 @@ Expected<bool> Labelling::replace(std::size_t model, std::span<const models::Pos
     if (l != 0 && l != model + 1) without[i] = std::min(ground_.tau, state_.distances[l - 1][i]);
   }
   kernels::Reused<models::Position> tried(proposals.begin(), proposals.end());
-  kernels::Reused<kernels::Reused<float>> distances;
+  Distances distances;
   kernels::Reused<double> gains;
   for (int fit = 0; fit <= kFits; ++fit) {
     auto measured = measure(tried);
     if (!measured) return tl::unexpected(measured.error());
     distances = std::move(*measured);
     gains.clear();
-    for (const std::vector<float>& one : distances) gains.push_back(saved(without, one));
+    for (std::size_t p = 0; p < tried.size(); ++p) gains.push_back(saved(without, distances[p]));
     if (fit == kFits) break;
     kernels::Reused<models::Position> next;
     for (const std::size_t p : largest(gains, kTried)) {
@@ -141,7 +141,7 @@ Expected<bool> Labelling::replace(std::size_t model, std::span<const models::Pos
   if (!(gains[p] > saved(without, state_.distances[model]))) return false;
   State with = state_;
   with.models[model] = tried[p];
-  with.distances[model] = std::move(distances[p]);
+  with.distances.set(model, distances[p]);
   with.fitted[model] = 0;
   return adopt(std::move(with));
 }
@@ -155,11 +155,13 @@ Expected<bool> Labelling::split(std::size_t model, std::span<const models::Posit
   auto measured = measure(proposals);
   if (!measured) return tl::unexpected(measured.error());
   kernels::Reused<double> gains;
-  for (const std::vector<float>& one : *measured) gains.push_back(saved(now, one));
+  for (std::size_t p = 0; p < proposals.size(); ++p) gains.push_back(saved(now, (*measured)[p]));
   for (const std::size_t p : largest(gains, kTried)) {
     if (gains[p] < kHint * prices_.model * static_cast<double>(ground_.tau)) break;
     std::array<models::Position, 2> halves{state_.models[model], proposals[p]};
-    kernels::Reused<kernels::Reused<float>> distances{state_.distances[model], (*measured)[p]};
+    Distances distances;
+    distances.add(state_.distances[model]);
+    distances.add((*measured)[p]);
     for (int fit = 0; fit < kFits; ++fit) {
       for (std::size_t k = 0; k < 2; ++k) {
         fit_to([&](std::size_t i) { return ours(i) && (k == 0 ? distances[0][i] <= distances[1][i] : distances[1][i] < distances[0][i]); },
@@ -169,15 +171,15 @@ Expected<bool> Labelling::split(std::size_t model, std::span<const models::Posit
       if (!again) return tl::unexpected(again.error());
       distances = std::move(*again);
     }
-    kernels::Reused<float> both = distances[0];
+    kernels::Reused<float> both(distances[0].begin(), distances[0].end());
     take_nearer(distances[1], both);
     if (!(saved(now, both) > kWorthTrying * prices_.model * static_cast<double>(ground_.tau))) continue;
     State with = state_;
     with.models[model] = halves[0];
-    with.distances[model] = std::move(distances[0]);
+    with.distances.set(model, distances[0]);
     with.fitted[model] = 0;
     with.models.push_back(halves[1]);
-    with.distances.push_back(std::move(distances[1]));
+    with.distances.add(distances[1]);
     with.fitted.push_back(0);
     auto adopted = adopt_one_more(std::move(with), kHalvesTooDear, model);
     if (!adopted || *adopted) return adopted;
@@ -199,17 +201,17 @@ Expected<bool> Labelling::join(std::size_t one, std::size_t other, std::span<con
   auto measured = measure(proposals);
   if (!measured) return tl::unexpected(measured.error());
   kernels::Reused<double> gains;
-  for (const std::vector<float>& each : *measured) gains.push_back(saved(most, each));
+  for (std::size_t p = 0; p < proposals.size(); ++p) gains.push_back(saved(most, (*measured)[p]));
   const std::size_t best = largest(gains, 1).front();
   const double saves = prices_.model + border(one, other), tau = static_cast<double>(ground_.tau);
   if (all - gains[best] / tau - now > kWithinReach * saves) return false;
   models::Position theta = proposals[best];
-  kernels::Reused<float> distances = std::move((*measured)[best]);
+  kernels::Reused<float> distances((*measured)[best].begin(), (*measured)[best].end());
   for (int fit = 0; fit < kFits; ++fit) {
     fit_to([&](std::size_t i) { return ours(i) && distances[i] < ground_.tau; }, theta);
     auto again = measure({&theta, 1});
     if (!again) return tl::unexpected(again.error());
-    distances = std::move(again->front());
+    distances.assign((*again)[0].begin(), (*again)[0].end());
   }
   if (all - saved(most, distances) / tau - now > saves) return false;
   State with = state_;
@@ -217,7 +219,7 @@ Expected<bool> Labelling::join(std::size_t one, std::size_t other, std::span<con
     if (l == other + 1) l = static_cast<std::uint16_t>(one + 1);
   }
   with.models[one] = std::move(theta);
-  with.distances[one] = std::move(distances);
+  with.distances.set(one, distances);
   with.fitted[one] = 0;
   remove(with, other);
   auto adopted = adopt(std::move(with));
