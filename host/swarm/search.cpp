@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "host/swarm/kinds.hpp"
 #include "host/swarm/swarm.hpp"
 
 namespace swarmfit::swarm {
@@ -11,7 +12,8 @@ namespace {
 
 constexpr double kStable = 0.01;  // spread of the list of global bests, as a share of the scale, below which it is stable
 constexpr int kTimesAsMany = 3;   // samples begin the swarm that follows one in vain
-constexpr std::size_t kScored = std::size_t{1} << 22;  // of them, on points: as many as a swarm may begin with for that
+// Of them, on points: as many as a swarm may begin with for that.
+constexpr std::size_t kScored = std::size_t{1} << 22, kScoredOnPart = std::size_t{1} << 24;
 
 }  // namespace
 
@@ -22,10 +24,12 @@ Settings Search::settings_of(std::size_t kind) const {
     if (settings.eager_starters > 0) settings.starters = std::min(settings.starters, settings.eager_starters);
     return settings;
   }
-  // The joint end makes out what swarms of correspondences miss; a part of a large cloud is searched again anyway; and what tells the scale
-  // of the noise is prominent.
-  if (!settings.joint || problem_.shares_out() || problem_.part_searched || settings.starters <= settings.particles) return settings;
-  const auto affordable = static_cast<int>(kScored / std::max<std::size_t>(1, problem_.points.finite_count()));
+  // The joint end makes out what swarms of correspondences miss; on a part of a large cloud planes have points enough, and several kinds
+  // are searched again anyway; and what tells the scale of the noise is prominent.
+  const bool enough = problem_.part_searched && (problem_.asked > 1 || !is_curved(problem_.space(kind).type()));
+  if (!settings.joint || problem_.shares_out() || enough || settings.starters <= settings.particles) return settings;
+  const std::size_t points = std::max<std::size_t>(1, problem_.searched().size());
+  const auto affordable = static_cast<int>((problem_.part_searched ? kScoredOnPart : kScored) / points);
   int more = settings.starters;
   for (int k = 0; k < vain_ && more < affordable; ++k) more *= kTimesAsMany;
   settings.starters = std::max(settings.starters, std::min(more, affordable));
