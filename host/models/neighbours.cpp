@@ -49,8 +49,8 @@ Eigen::Vector3f normal_of(const WorkingPoints& points, std::span<const std::uint
   return solver.eigenvectors().col(0).cast<float>();
 }
 
-// Places that a thread takes at a time, and how many are not worth waking one for.
-constexpr std::size_t kRun = 64, kFew = 1024;
+// Places that a thread takes at a time, and how many are not worth waking one for: a search takes a microsecond.
+constexpr std::size_t kRun = 32, kFew = 128;
 
 /// Places of the `count` candidates nearest to each, one after the other.
 template <std::size_t D>

@@ -81,24 +81,35 @@ void Labelling::label(State& state, std::span<const std::uint16_t> only) {
   common::PottsEnergy& potts = potts_;
   potts.forget_labels();
   potts.reserve(points, points * (models + 1), edges_.size());
+  // Whole units, a point's one after the other; beyond reach where the point may not be the model's.
+  constexpr auto kFree = static_cast<std::int32_t>(kUnit), kReach = static_cast<std::int32_t>(kUnit * kFarthest);
+  kernels::Reused<std::int32_t> costs(points * models);
+  const float per_tau = 1 / ground_.tau;
+  for (std::size_t m = 0; m < models; ++m) {
+    const std::span<const float> distances = std::as_const(state.distances)[m];
+    for (std::size_t i = 0; i < points; ++i) {
+      const float far = distances[i] * per_tau;
+      costs[i * models + m] = far <= kFarthest ? static_cast<std::int32_t>(static_cast<float>(kUnit) * far) : kReach + 1;
+    }
+  }
   kernels::Reused<std::uint16_t> nearest(points, 0);
   for (std::size_t i = 0; i < points; ++i) {
     potts.add_node();
-    potts.add_label(0, static_cast<Cost>(kUnit));
+    potts.add_label(0, kFree);
+    const std::uint16_t before = i < state.labels.size() ? state.labels[i] : std::uint16_t{0};
+    std::int32_t least = kFree;
     bool may_stay = false;
-    float least = 1;
     for (std::size_t m = 0; m < models; ++m) {
-      const float far = state.distances[m][i] / ground_.tau;
-      if (!(far <= kFarthest)) continue;
+      const std::int32_t cost = costs[i * models + m];
+      if (cost > kReach) continue;
       const auto label = static_cast<std::uint16_t>(m + 1);
-      potts.add_label(label, static_cast<Cost>(kUnit * static_cast<double>(far)));
-      may_stay = may_stay || (i < state.labels.size() && state.labels[i] == label);
-      if (far < least) {
-        least = far;
-        nearest[i] = label;
-      }
+      potts.add_label(label, cost);
+      may_stay = may_stay || label == before;
+      if (cost >= least) continue;
+      least = cost;
+      nearest[i] = label;
     }
-    if (may_stay) nearest[i] = state.labels[i];
+    if (may_stay) nearest[i] = before;
   }
   // Gross outliers lie anywhere: a neighbour of theirs is not as odd as one that follows another model.
   potts.set_ground(0);
@@ -245,31 +256,49 @@ Expected<bool> Labelling::try_one(models::Position proposal, std::span<const flo
   return adopt_one_more(std::move(with), kTooDear);
 }
 
-void Labelling::weigh_gains(const Distances& distances, std::vector<double>& gains) const {
+void Labelling::weigh_gains(Offers& offers) const {
   const kernels::Reused<float> now = present_costs();
-  for (std::size_t p = 0; p < gains.size(); ++p) {
+  for (std::size_t p = 0; p < offers.gains.size(); ++p) {
     // What promises nothing now is not asked again.
-    if (gains[p] < kPromising * prices_.model) continue;
-    gains[p] = saved(now, distances[p]) / static_cast<double>(ground_.tau);
+    if (offers.gains[p] < kPromising * prices_.model) continue;
+    offers.gains[p] = saved(now, offers.distances[p]) / static_cast<double>(ground_.tau);
   }
 }
 
+Expected<Labelling::Offers> Labelling::promising(std::span<const models::Position> proposals) const {
+  constexpr std::size_t kAtOnce = 32;  // whose distances stay in a core's cache
+  const kernels::Reused<float> now = present_costs();
+  Offers offers;
+  for (std::size_t first = 0; first < proposals.size(); first += kAtOnce) {
+    const auto some = proposals.subspan(first, std::min(kAtOnce, proposals.size() - first));
+    auto distances = measure(some);
+    if (!distances) return tl::unexpected(distances.error());
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      const double gain = saved(now, (*distances)[k]) / static_cast<double>(ground_.tau);
+      if (!(gain > kPromising * prices_.model)) continue;
+      offers.proposals.push_back(first + k);
+      offers.gains.push_back(gain);
+      offers.distances.add((*distances)[k]);
+    }
+  }
+  return offers;
+}
+
 Expected<bool> Labelling::offer(std::span<const models::Position> proposals) {
-  auto distances = measure(proposals);
-  if (!distances) return tl::unexpected(distances.error());
-  kernels::Reused<double> gains(proposals.size(), std::numeric_limits<double>::infinity());
-  weigh_gains(*distances, gains);
+  auto offers = promising(proposals);
+  if (!offers) return tl::unexpected(offers.error());
+  kernels::Reused<double>& gains = offers->gains;
   bool any = false;
   for (int failures = 0; failures < kFailures && !full() && !enough_();) {
     const auto best = std::max_element(gains.begin(), gains.end());
     if (best == gains.end() || !(*best > kPromising * prices_.model)) break;
     const auto p = static_cast<std::size_t>(best - gains.begin());
     gains[p] = 0;
-    auto joined = try_one(proposals[p], (*distances)[p]);
+    auto joined = try_one(proposals[offers->proposals[p]], offers->distances[p]);
     if (!joined) return tl::unexpected(joined.error());
     any = any || *joined;
     failures += *joined ? 0 : 1;
-    if (*joined) weigh_gains(*distances, gains);
+    if (*joined) weigh_gains(*offers);
   }
   return any;
 }

@@ -121,8 +121,15 @@ class Labelling {
   /// determine one.
   template <class Takes>
   void fit_to(Takes&& takes, models::Position& theta) const;
-  /// What each proposal would save of what the points cost as things stand, in units of tau.
-  void weigh_gains(const Distances& distances, std::vector<double>& gains) const;
+  /// Proposals by their number, and what each would save of what the points cost as things stand, in units of tau.
+  struct Offers {
+    kernels::Reused<std::size_t> proposals;
+    kernels::Reused<double> gains;
+    Distances distances;
+  };
+  /// Those that would save enough to be tried.
+  Expected<Offers> promising(std::span<const models::Position> proposals) const;
+  void weigh_gains(Offers& offers) const;
 
   const Ground& ground_;
   const Subset& part_;

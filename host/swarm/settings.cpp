@@ -183,9 +183,13 @@ Settings for_kind(Settings s, ModelType type) {
   s.renewal_share = 0.75;
   s.patience = 2;
   s.prices = type == ModelType::homography ? LabelPrices{0.15, 5.5} : LabelPrices{0.25, 5.5, 0.8, 0.5};
-  // Seven points hit one body seldom, and where a surface ends four do: two searches that end sooner find more than one that takes its time.
+  if (type == ModelType::homography) {
+    s.stall = 3;  // the joint end's swarms and samples of each model's own points go on from there
+    return s;
+  }
+  // Seven points hit one body seldom: two searches that end sooner find more than one that takes its time.
   s.searches = 2;
-  s.stall = type == ModelType::homography ? 3 : 7;
+  s.stall = 7;
   return s;
 }
 
