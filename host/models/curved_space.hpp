@@ -108,14 +108,11 @@ class Linearised : public Base {
 
   int residual_components() const noexcept override { return Components; }
 
-  /// The residual alone; a kind whose derivatives take long hides this.
-  bool tell_residual(const double* row, const Position& theta, Linear& at) const { return itself().linearise(row, theta, at); }
-
   bool residual(const WorkingPoints& points, std::uint32_t index, const Position& theta, std::span<double> components) const override {
     std::array<double, kMaxDimension> row{};
     for (int d = 0; d < points.dimension(); ++d) row[static_cast<std::size_t>(d)] = points.at(index, d);
     Linear at;
-    if (!itself().tell_residual(row.data(), theta, at)) return false;
+    if (!itself().linearise(row.data(), theta, at)) return false;
     for (int c = 0; c < Components; ++c) components[static_cast<std::size_t>(c)] = at.residual[c];
     return true;
   }
@@ -149,7 +146,7 @@ class Linearised : public Base {
     Linear at;
     SupportRows::Room room;
     for (std::size_t k = 0; k < support.size(); ++k) {
-      if (!itself().tell_residual(support.row(k, room), theta, at)) return std::numeric_limits<double>::infinity();
+      if (!itself().linearise(support.row(k, room), theta, at)) return std::numeric_limits<double>::infinity();
       sum += support.weight(k) * at.residual.squaredNorm();
     }
     return sum;
