@@ -92,50 +92,47 @@ class CurvedSpace : public ModelSpace {
   virtual double squares(const SupportRows& support, const Position& theta) const = 0;
 };
 
-/// The sums of a kind whose sizes are known at compile time: they run over every point of the support at each step, and are most of what a
+/// The sums of a kind of one residual a point whose sizes are known at compile time: they run over every point of the support at each step, and are most of what a
 /// refinement takes. `Kind` has `bool linearise(row, theta, Linear&) const`, row the point's columns, false where the residual is not
 /// defined at this point, which then has no say.
-template <class Kind, class Base, int Components, int Parameters>
-class Linearised : public Base {
+template <class Kind, int Parameters>
+class Linearised : public CurvedSpace {
  protected:
   using Row = Eigen::Matrix<double, 1, Parameters>;
-  /// Residual components of one point, whitened: under equal independent noise in every column each has that noise's deviation.
+  /// Residual of one point, whitened: under equal independent noise in every column it has that noise's deviation.
   struct Linear {
-    Eigen::Matrix<double, Components, 1> residual;
-    Eigen::Matrix<double, Components, Parameters, Components == 1 ? Eigen::RowMajor : Eigen::ColMajor>
-        by_parameter;  ///< derivative by the position's entries
+    double residual;
+    Row by_parameter;  ///< derivative by the position's entries
   };
 
-  int residual_components() const noexcept override { return Components; }
+  int residual_components() const noexcept override { return 1; }
 
   bool residual(const WorkingPoints& points, std::uint32_t index, const Position& theta, std::span<double> components) const override {
     std::array<double, kMaxDimension> row{};
     for (int d = 0; d < points.dimension(); ++d) row[static_cast<std::size_t>(d)] = points.at(index, d);
     Linear at;
     if (!itself().linearise(row.data(), theta, at)) return false;
-    for (int c = 0; c < Components; ++c) components[static_cast<std::size_t>(c)] = at.residual[c];
+    components[0] = at.residual;
     return true;
   }
 
-  typename Base::Equations equations(const SupportRows& support, const Position& theta) const override {
+  Equations equations(const SupportRows& support, const Position& theta) const override {
     Eigen::Matrix<double, Parameters, Parameters> information = Eigen::Matrix<double, Parameters, Parameters>::Zero();
     Eigen::Matrix<double, Parameters, 1> gradient = Eigen::Matrix<double, Parameters, 1>::Zero();
-    typename Base::Equations sum;
+    Equations sum;
     Linear at;
     at.by_parameter.setZero();
     SupportRows::Room room;
     for (std::size_t k = 0; k < support.size(); ++k) {
       if (!itself().linearise(support.row(k, room), theta, at)) continue;
       const double w = support.weight(k);
-      for (int i = 0; i < Components; ++i) {
-        const Row row = at.by_parameter.row(i);
-        for (int c = 0; c < Parameters; ++c) information.col(c) += (w * row[c]) * row.transpose();
-        gradient += (w * at.residual[i]) * row.transpose();
-        sum.squares += w * at.residual[i] * at.residual[i];
-      }
+      const Row& row = at.by_parameter;
+      for (int c = 0; c < Parameters; ++c) information.col(c) += (w * row[c]) * row.transpose();
+      gradient += (w * at.residual) * row.transpose();
+      sum.squares += w * at.residual * at.residual;
       ++sum.used;
     }
-    const typename Base::Basis chart = this->basis(theta);
+    const Basis chart = this->basis(theta);
     sum.information = chart.transpose() * information * chart;
     sum.gradient = chart.transpose() * gradient;
     return sum;
@@ -147,7 +144,7 @@ class Linearised : public Base {
     SupportRows::Room room;
     for (std::size_t k = 0; k < support.size(); ++k) {
       if (!itself().linearise(support.row(k, room), theta, at)) return std::numeric_limits<double>::infinity();
-      sum += support.weight(k) * at.residual.squaredNorm();
+      sum += support.weight(k) * (at.residual * at.residual);
     }
     return sum;
   }

@@ -12,7 +12,7 @@ constexpr double kLargest = 2;
 constexpr double kLeastTurn = 0.1;
 
 /// Position: a point of the axis (the one nearest the origin), its direction, the radius.
-class Cylinder final : public Linearised<Cylinder, CurvedSpace, 1, 7> {
+class Cylinder final : public Linearised<Cylinder, 7> {
  public:
   using Vector = Eigen::Vector3d;
 
@@ -102,7 +102,7 @@ class Cylinder final : public Linearised<Cylinder, CurvedSpace, 1, 7> {
     const Vector across = arm - along * axis;
     const double length = across.norm();
     if (!(length > 0)) return false;
-    at.residual[0] = length - theta[6];
+    at.residual = length - theta[6];
     const Vector outward = across / length;
     at.by_parameter.block<1, 3>(0, 0) = -outward.transpose();
     at.by_parameter.block<1, 3>(0, 3) = -along * outward.transpose();

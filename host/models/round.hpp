@@ -8,11 +8,11 @@
 namespace swarmfit::models {
 
 template <int D>
-class Round : public Linearised<Round<D>, CurvedSpace, 1, D + 1> {
+class Round : public Linearised<Round<D>, D + 1> {
  public:
   using Vector = Eigen::Matrix<double, D, 1>;
   using Basis = CurvedSpace::Basis;
-  using Linear = typename Linearised<Round<D>, CurvedSpace, 1, D + 1>::Linear;
+  using Linear = typename Linearised<Round<D>, D + 1>::Linear;
 
   int minimal_sample() const noexcept override { return D + 1; }
   int least_rank() const noexcept override { return D; }
@@ -60,7 +60,7 @@ class Round : public Linearised<Round<D>, CurvedSpace, 1, D + 1> {
     const Vector arm = Eigen::Map<const Vector>(row) - theta.template head<D>();
     const double length = arm.norm();
     if (!(length > 0)) return false;
-    at.residual[0] = length - theta[D];
+    at.residual = length - theta[D];
     at.by_parameter.template topLeftCorner<1, D>() = -arm.transpose() / length;
     at.by_parameter(0, D) = -1;
     return true;
